@@ -1,0 +1,63 @@
+"""smolux: exact Monte Carlo and deterministic solvers for aggregation and fragmentation.
+
+One description of the physics (`Model`), many ways to compute it (`simulate`, `solve`), one shape of
+result (an `xarray.Dataset`).
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+#: public name -> module that defines it; a module stands for itself
+_LAZY = {
+    "Model": "smolux.model",
+    "simulate": "smolux.simulate",
+    "resume": "smolux.simulate",
+    "solve": "smolux.deterministic",
+    "summary": "smolux.analysis",
+    "InputError": "smolux.errors",
+    "Interrupted": "smolux.errors",
+    "SmoluxWarning": "smolux.errors",
+    **dict.fromkeys(
+        ("analysis", "exact", "initial", "kernels", "methods", "plotting", "processes", "results", "weighting")
+    ),
+    "plot": "smolux.plotting",
+}
+_MODULES = {"plot"}
+
+__all__ = ["__version__", *sorted(_LAZY)]
+
+if TYPE_CHECKING:
+    from . import (
+        analysis,
+        exact,
+        initial,
+        kernels,
+        methods,
+        plotting,
+        processes,
+        results,
+        weighting,
+    )
+    from . import plotting as plot
+    from .analysis import summary
+    from .deterministic import solve
+    from .errors import InputError, Interrupted, SmoluxWarning
+    from .model import Model
+    from .simulate import resume, simulate
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module 'smolux' has no attribute {name!r}")
+    module = importlib.import_module(_LAZY[name] or f"smolux.{name}")
+    value = module if _LAZY[name] is None or name in _MODULES else getattr(module, name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,56 @@
+"""What smolux raises and warns with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from difflib import get_close_matches
+
+
+class InputError(ValueError):
+    """A mistake in what the user wrote: names the argument, its value and the cure.
+
+    Parameters
+    ----------
+    problems : str or sequence of str
+        One message for each mistake; all that could be found at once.
+
+    Attributes
+    ----------
+    problems : list of str
+    """
+
+    def __init__(self, problems: str | Sequence[str]) -> None:
+        self.problems = [problems] if isinstance(problems, str) else list(problems)
+        super().__init__("\n".join(self.problems))
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[list[str]]]:
+        return type(self), (self.problems,)
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run stopped on request before its end.
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset
+        What was computed; output times not reached are NaN.
+    checkpoint : pathlib.Path or None
+        The file from which the run goes on, bit for bit.
+    """
+
+    def __init__(self, message: str, dataset: object = None, checkpoint: object = None) -> None:
+        super().__init__(message)
+        self.dataset = dataset
+        self.checkpoint = checkpoint
+
+
+class SmoluxWarning(UserWarning):
+    """Something the user should know of a result: also stored in its attributes."""
+
+
+def did_you_mean(word: str, choices: Sequence[str]) -> str:
+    """Return ``"; did you mean 'x'?"`` for the nearest choice, else the list of choices."""
+    near = get_close_matches(word, choices, n=1)
+    if near:
+        return f"; did you mean {near[0]!r}?"
+    return "; choose from " + ", ".join(repr(c) for c in choices)

@@ -1,0 +1,287 @@
+"""Initial size distributions.
+
+A distribution gives number densities of integer sizes. A simulation draws its particles by
+systematic sampling, one uniform number for the whole population, so every size is met to within one
+particle of its share and the expected counts are exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from .errors import InputError
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+#: the share of particles that a distribution without an end may leave out
+_TAIL = 1e-17
+
+
+@dataclass(frozen=True)
+class Initial:
+    """A size distribution at time zero: `density` particles per unit volume in all."""
+
+    name: ClassVar[str]
+
+    @property
+    def total(self) -> float:
+        """Number of particles per unit volume."""
+        raise NotImplementedError
+
+    def cumulative(self, sizes: Float) -> Float:
+        """Share of the particles whose size is at most `sizes`."""
+        raise NotImplementedError
+
+    def quantile(self, share: Float) -> Int:
+        """Smallest size below or at which `share` of the particles lie."""
+        raise NotImplementedError
+
+    def densities(self, largest: int) -> Float:
+        """Number densities of the sizes ``1 .. largest``."""
+        edges = self.cumulative(np.arange(0, largest + 1, dtype=float))
+        return self.total * np.diff(edges)
+
+    @property
+    def largest(self) -> int:
+        """The largest size that is present, or beyond which a share of 1e-17 lies."""
+        return int(self.quantile(np.array([1.0 - _TAIL]))[0])
+
+    def sample(self, particles: int, u: float) -> tuple[Int, Int]:
+        """Draw a population by systematic sampling.
+
+        Parameters
+        ----------
+        particles : int
+            How many.
+        u : float
+            A uniform number in [0, 1).
+
+        Returns
+        -------
+        sizes, counts : ndarray of int64
+            The sizes present, ascending, and how many particles have each.
+        """
+        sizes, counts = [], []
+        step = 1 << 22  # bounds the memory of one batch
+        for start in range(0, particles, step):
+            index = np.arange(start, min(start + step, particles))
+            s, c = np.unique(self.quantile((index + u) / particles), return_counts=True)
+            sizes.append(s)
+            counts.append(c)
+        size, inverse = np.unique(np.concatenate(sizes), return_inverse=True)
+        return size, np.bincount(inverse, np.concatenate(counts)).astype(np.int64)
+
+
+def _positive(problems: list[str], **values: float) -> None:
+    problems += [
+        f"{key} = {value!r}: must be a positive finite number"
+        for key, value in values.items()
+        if not (np.isfinite(value) and value > 0)
+    ]
+
+
+@dataclass(frozen=True)
+class Sizes(Initial):
+    """Given number densities of given sizes; see `from_sizes`."""
+
+    sizes: tuple[int, ...]
+    densities_: tuple[float, ...]
+    name: ClassVar[str] = "sizes"
+
+    def __post_init__(self) -> None:
+        problems = []
+        if not self.sizes:
+            problems.append("initial sizes: at least one size is needed, for example {1: 1.0}")
+        problems += [
+            f"initial size {s!r}: sizes are whole numbers from 1 to 2**62"
+            for s in self.sizes
+            if s != int(s) or not 1 <= s <= 2**62
+        ]
+        problems += [
+            f"initial density {d!r} of size {s}: must be a finite number, zero or more"
+            for s, d in zip(self.sizes, self.densities_, strict=True)
+            if not (np.isfinite(d) and d >= 0)
+        ]
+        if self.sizes and not problems and sum(self.densities_) <= 0:
+            problems.append("initial sizes: every density is zero")
+        if problems:
+            raise InputError(problems)
+
+    @property
+    def total(self) -> float:
+        """See `Initial.total`."""
+        return float(sum(self.densities_))
+
+    def _shares(self) -> Float:
+        shares = np.cumsum(self.densities_) / self.total
+        shares[-1] = 1.0
+        return shares
+
+    def cumulative(self, sizes: Float) -> Float:
+        """See `Initial.cumulative`."""
+        shares = np.concatenate(([0.0], self._shares()))
+        return shares[np.searchsorted(self.sizes, sizes, side="right")]
+
+    def quantile(self, share: Float) -> Int:
+        """See `Initial.quantile`."""
+        index = np.searchsorted(self._shares(), share, side="right")
+        return np.asarray(self.sizes, np.int64)[np.minimum(index, len(self.sizes) - 1)]
+
+    def densities(self, largest: int) -> Float:
+        """See `Initial.densities`; exact, not a difference of shares."""
+        n = np.zeros(largest)
+        for size, density in zip(self.sizes, self.densities_, strict=True):
+            if size <= largest:
+                n[size - 1] = density
+        return n
+
+    @property
+    def largest(self) -> int:
+        """See `Initial.largest`."""
+        return max(s for s, d in zip(self.sizes, self.densities_, strict=True) if d > 0)
+
+
+@dataclass(frozen=True)
+class Exponential(Initial):
+    """Geometric law ``n_k ~ exp(-k / c)`` on the whole sizes, of a given mean; see `exponential`."""
+
+    mean: float
+    density: float = 1.0
+    name: ClassVar[str] = "exponential"
+
+    def __post_init__(self) -> None:
+        problems: list[str] = []
+        _positive(problems, density=self.density)
+        if not (np.isfinite(self.mean) and self.mean >= 1):
+            problems.append(f"mean = {self.mean!r}: the mean size must be a number of at least 1")
+        if problems:
+            raise InputError(problems)
+
+    @property
+    def total(self) -> float:
+        """See `Initial.total`."""
+        return self.density
+
+    @property
+    def _log_ratio(self) -> float:
+        return float(np.log1p(-1.0 / self.mean)) if self.mean > 1 else -np.inf
+
+    def cumulative(self, sizes: Float) -> Float:
+        """See `Initial.cumulative`."""
+        sizes = np.floor(np.asarray(sizes, float))
+        if self.mean == 1:
+            return (sizes >= 1).astype(float)
+        return -np.expm1(np.maximum(sizes, 0) * self._log_ratio)
+
+    def densities(self, largest: int) -> Float:
+        """See `Initial.densities`; exact far into the tail."""
+        if self.mean == 1:
+            return self.density * (np.arange(1, largest + 1) == 1)
+        return self.density / self.mean * np.exp(np.arange(largest) * self._log_ratio)
+
+    def quantile(self, share: Float) -> Int:
+        """See `Initial.quantile`."""
+        if self.mean == 1:
+            return np.ones(np.shape(share), np.int64)
+        return np.floor(np.log1p(-np.asarray(share)) / self._log_ratio).astype(np.int64) + 1
+
+
+@dataclass(frozen=True)
+class Lognormal(Initial):
+    """Lognormal law rounded to whole sizes; see `lognormal`."""
+
+    median: float
+    sigma: float
+    density: float = 1.0
+    name: ClassVar[str] = "lognormal"
+
+    def __post_init__(self) -> None:
+        problems: list[str] = []
+        _positive(problems, median=self.median, density=self.density)
+        if not (np.isfinite(self.sigma) and self.sigma > 1):
+            problems.append(
+                f"sigma = {self.sigma!r}: the geometric standard deviation must exceed 1 "
+                "(1.3 is narrow, 2 is wide)"
+            )
+        if problems:
+            raise InputError(problems)
+
+    @property
+    def total(self) -> float:
+        """See `Initial.total`."""
+        return self.density
+
+    def cumulative(self, sizes: Float) -> Float:
+        """See `Initial.cumulative`; what lies below 1/2 counts as size 1."""
+        sizes = np.floor(np.asarray(sizes, float))
+        z = np.log(np.maximum(sizes, 1) / self.median + 0.5 / self.median) / np.log(self.sigma)
+        return np.where(sizes >= 1, special.ndtr(z), 0.0)
+
+    def quantile(self, share: Float) -> Int:
+        """See `Initial.quantile`."""
+        size = self.median * self.sigma ** special.ndtri(np.asarray(share, float))
+        return np.maximum(np.ceil(size - 0.5), 1).astype(np.int64)
+
+
+def monodisperse(density: float = 1.0, size: int = 1) -> Sizes:
+    """All particles have one size.
+
+    Parameters
+    ----------
+    density : float
+        Particles per unit volume.
+    size : int
+        Their size.
+    """
+    return from_sizes({size: density})
+
+
+def from_sizes(densities: Mapping[int, float]) -> Sizes:
+    """Give the number density of each size: ``{1: 0.1, 2: 0.1}``.
+
+    Parameters
+    ----------
+    densities : mapping of int to float
+        Size to particles per unit volume.
+    """
+    items = sorted(densities.items())
+    return Sizes(tuple(int(s) if s == int(s) else s for s, _ in items), tuple(float(d) for _, d in items))
+
+
+def exponential(mean: float, density: float = 1.0) -> Exponential:
+    """Sizes exponentially (on whole numbers: geometrically) distributed.
+
+    Parameters
+    ----------
+    mean : float
+        Mean size, at least 1.
+    density : float
+        Particles per unit volume.
+    """
+    return Exponential(float(mean), float(density))
+
+
+def lognormal(median: float, sigma: float, density: float = 1.0) -> Lognormal:
+    """Sizes lognormally distributed, rounded to whole numbers of at least 1.
+
+    Parameters
+    ----------
+    median : float
+        Median size (count median).
+    sigma : float
+        Geometric standard deviation, above 1.
+    density : float
+        Particles per unit volume.
+    """
+    return Lognormal(float(median), float(sigma), float(density))
+
+
+#: every initial condition; the name in a case file is its ``name``, "monodisperse" being short for one size
+INITIALS: tuple[type[Initial], ...] = (Sizes, Exponential, Lognormal)
