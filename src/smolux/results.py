@@ -1,12 +1,16 @@
-"""The shape of every result: an `xarray.Dataset` with units, provenance and the seed."""
+"""The shape of every result: an `xarray.Dataset` with units, provenance and the seed; its files."""
 
 from __future__ import annotations
 
+import csv
 import datetime
+import io
 import json
+import os
 import platform
 from collections.abc import Mapping
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +18,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from . import __version__
+from .errors import InputError
+from .files import replacing
 from .model import Model
 from .model_dict import model_to_dict
 from .records import Records
@@ -176,3 +182,166 @@ def to_dataset(model: Model, records: Records) -> xr.Dataset:
     if "row_size" in ds:
         ds["row_size"].attrs["sample_dimension"] = "sample"
     return ds
+
+
+def population(ds: xr.Dataset, replica: int, time: float) -> tuple[NDArray[np.int64], ...]:
+    """Return the whole population of one replica at one time, if the result holds it.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        A result of ``simulate(..., distribution=True)``.
+    replica : int
+    time : float
+        One of the output times.
+
+    Returns
+    -------
+    sizes, counts : ndarray of int64
+        The sizes present, and how many simulated particles have each; empty if the time was not
+        reached.
+
+    Raises
+    ------
+    InputError
+        If the result holds no populations, or none of that replica and time.
+    """
+    if "row_size" not in ds:
+        raise InputError(
+            "the result holds no whole populations: simulate with distribution=True, "
+            "or use the densities n and n_bin"
+        )
+    rows = ds["row_size"].values
+    found = np.flatnonzero(
+        (ds["instance_replica"].values == replica) & (ds["instance_time"].values == time)
+    )
+    if not found.size:
+        raise InputError(
+            f"replica = {replica!r}, time = {time!r}: no such population; "
+            f"replicas are 0 to {ds.sizes['replica'] - 1}, times are {ds['time'].values.tolist()}"
+        )
+    start = int(rows[: found[0]].sum())
+    row = slice(start, start + int(rows[found[0]]))
+    return ds["sample_size"].values[row], ds["sample_count"].values[row]
+
+
+def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write a result as a netCDF-4 file, whole or not at all.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+    path : str or path
+        Replaced in one step if it exists; see `smolux.files.replacing`.
+
+    Returns
+    -------
+    pathlib.Path
+
+    Raises
+    ------
+    InputError
+        If the folder does not exist.
+    OSError
+        If the disk is full or read-only; an old file stays as it was.
+    """
+    ds = ds.assign_attrs({k: _attribute(v) for k, v in ds.attrs.items() if v is not None})
+    ds = ds.drop_encoding()
+    # small arrays gain nothing; shuffling the bytes first is what makes doubles compress
+    packed = {"zlib": True, "complevel": 4, "shuffle": True}
+    encoding = {
+        name: packed
+        for name, variable in ds.variables.items()
+        if variable.size > 2048 and variable.dtype.kind in "fi"
+    }
+    # in memory first: HDF5 crashes the process when the disk fills up while it writes
+    content = ds.to_netcdf(engine="h5netcdf", encoding=encoding)
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+    return Path(path)
+
+
+def load(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read a result that `save` wrote; bit for bit the same, all in memory.
+
+    Parameters
+    ----------
+    path : str or path
+
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or if it is no netCDF file, no result of smolux, or one of a newer
+        version of smolux.
+    """
+    file = Path(path).expanduser()
+    if not file.is_file():
+        what = "is a folder" if file.is_dir() else "there is no such file"
+        raise InputError(f"path = {str(path)!r}: {what}; name a results file such as results.nc")
+    try:
+        ds = xr.load_dataset(file, engine="h5netcdf", decode_times=False, decode_timedelta=False)
+    except PermissionError:
+        raise
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        raise InputError(
+            f"path = {str(path)!r}: cannot be read as netCDF-4 ({error}); "
+            "it is another kind of file, or a damaged one"
+        ) from error
+    if "smolux_schema" not in ds.attrs:
+        raise InputError(
+            f"path = {str(path)!r}: is a netCDF file, but not one that smolux wrote "
+            "(it has no attribute 'smolux_schema')"
+        )
+    if ds.attrs["smolux_schema"] > SCHEMA:
+        raise InputError(
+            f"path = {str(path)!r}: was written by a newer version, {ds.attrs.get('source')}; "
+            f"this is smolux {__version__}: pip install --upgrade smolux"
+        )
+    ds.attrs = {k: v.item() if isinstance(v, np.generic) else v for k, v in ds.attrs.items()}
+    return ds.drop_encoding()
+
+
+def to_csv(ds: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+    """Write the time series of a result for a spreadsheet: one row for each replica and time.
+
+    The columns are replica, time, every quantity of (replica, time) and, side by side, the moments
+    (``moment_2``) and the collisions by outcome (``events_shattering``). What was not reached is
+    an empty cell. Numbers have as many digits as it takes to read back the same double.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+    path : str or path
+
+    Returns
+    -------
+    pathlib.Path
+
+    Raises
+    ------
+    InputError, OSError
+        As for `save`.
+    """
+    columns: dict[str, Float] = {}
+    for name, variable in ds.data_vars.items():
+        if variable.dims == ("replica", "time"):
+            columns[str(name)] = variable.values
+        elif variable.dims in (("replica", "time", "order"), ("replica", "time", "process")):
+            labels = ds[variable.dims[2]].values
+            for k, label in enumerate(labels):
+                text = f"{label:g}" if variable.dims[2] == "order" else label
+                columns[f"{name}_{text}"] = variable.values[:, :, k]
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["replica", "time", *columns])
+    for r, replica in enumerate(ds["replica"].values):
+        for t, time in enumerate(ds["time"].values):
+            row = [float(values[r, t]) for values in columns.values()]
+            table.writerow([replica, float(time), *("" if v != v else repr(v) for v in row)])
+    with replacing(path) as temporary:
+        temporary.write_text(text.getvalue(), encoding="utf-8")
+    return Path(path)
