@@ -20,8 +20,10 @@ from .errors import InputError
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
-#: the share of particles that a distribution without an end may leave out
-_TAIL = 1e-17
+#: the share of particles that a distribution without an end may leave out, and the largest double
+#: below one
+_TAIL = 2.0**-53
+_BELOW_ONE = 1.0 - _TAIL
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,8 @@ class Initial:
 
     @property
     def largest(self) -> int:
-        """The largest size that is present, or beyond which a share of 1e-17 lies."""
-        return int(self.quantile(np.array([1.0 - _TAIL]))[0])
+        """The largest size that is present, or beyond which a share of 1e-16 lies."""
+        return int(self.quantile(np.array([_BELOW_ONE]))[0])
 
     def sample(self, particles: int, u: float) -> tuple[Int, Int]:
         """Draw a population by systematic sampling.
@@ -72,7 +74,9 @@ class Initial:
         step = 1 << 22  # bounds the memory of one batch
         for start in range(0, particles, step):
             index = np.arange(start, min(start + step, particles))
-            s, c = np.unique(self.quantile((index + u) / particles), return_counts=True)
+            # the last share may round up to one, where a distribution without an end has no size
+            share = np.minimum((index + u) / particles, _BELOW_ONE)
+            s, c = np.unique(self.quantile(share), return_counts=True)
             sizes.append(s)
             counts.append(c)
         size, inverse = np.unique(np.concatenate(sizes), return_inverse=True)
