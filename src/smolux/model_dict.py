@@ -1,52 +1,69 @@
-"""A model as plain data: what case files and result files hold."""
+"""A model as plain data, and back: what result files hold."""
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import Any
+import inspect
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING, fields
+from typing import Any, TypeVar
 
 import numpy as np
 
-from .initial import Initial, Sizes
+from . import kernels
+from .errors import InputError, did_you_mean
+from .initial import INITIALS, Initial, Sizes, from_sizes, monodisperse
 from .kernels.base import Kernel
 from .model import Model
+from .processes import PROCESSES
 from .processes.base import PairProcess
+from .timefunction import TimeFunction
+
+T = TypeVar("T")
+
+#: the key under which a Python function stands with its source text, which nothing is rebuilt from
+FUNCTION = "function"
+
+
+def _source(function: Callable[..., Any]) -> dict[str, str]:
+    """Return the text of a function, or only its name in a session that keeps no text."""
+    name = getattr(function, "__qualname__", repr(function))
+    try:
+        return {FUNCTION: name, "source": textwrap.dedent(inspect.getsource(function))}
+    except (OSError, TypeError):
+        return {FUNCTION: name}
 
 
 def _plain(value: Any) -> Any:
-    """Return numbers, texts and lists as plain Python; a function of time as its text."""
-    if isinstance(value, str) or value is None:
-        return value
-    if isinstance(value, (bool, np.bool_)):
-        return bool(value)
-    if isinstance(value, (int, np.integer)):
-        return int(value)
-    if isinstance(value, (float, np.floating)):
-        return float(value)
+    """Return plain Python numbers, texts, lists and dictionaries."""
+    if isinstance(value, TimeFunction):
+        if value.constant is not None:
+            return float(value.constant)
+        return value.text if value.rigorous else _source(value.rate)
+    if isinstance(value, np.generic):
+        return value.item()
     if isinstance(value, (list, tuple)):
         return [_plain(v) for v in value]
-    if isinstance(value, dict):
+    if isinstance(value, Mapping):
         return {str(k): _plain(v) for k, v in value.items()}
-    return str(getattr(value, "text", value))
+    return _source(value) if callable(value) else value
+
+
+def _fields(thing: Kernel | PairProcess | Initial) -> dict[str, Any]:
+    return {f.name: _plain(getattr(thing, f.name)) for f in fields(thing)}
 
 
 def _kernel_to_dict(kernel: Kernel) -> dict[str, Any]:
-    return {"name": kernel.name} | {f.name: _plain(getattr(kernel, f.name)) for f in fields(kernel)}
-
-
-def _process_to_dict(process: PairProcess) -> dict[str, Any]:
-    return {"name": process.name} | {
-        f.name: _plain(getattr(process, f.name)) for f in fields(process)
-    }
+    if type(kernel) in kernels.KERNELS:
+        return {"name": kernel.name, **_fields(kernel)}
+    return {"name": kernel.name, **_source(getattr(kernel, "function", type(kernel)))}
 
 
 def _initial_to_dict(initial: Initial) -> dict[str, Any]:
     if isinstance(initial, Sizes):
-        densities = dict(zip(map(str, initial.sizes), initial.densities_, strict=True))
-        return {"name": initial.name, "densities": densities}
-    return {"name": initial.name} | {
-        f.name: _plain(getattr(initial, f.name)) for f in fields(initial)
-    }
+        pairs = zip(initial.sizes, initial.densities_, strict=True)
+        return {"name": initial.name, "densities": {str(size): float(n) for size, n in pairs}}
+    return {"name": initial.name, **_fields(initial)}
 
 
 def model_to_dict(model: Model) -> dict[str, Any]:
@@ -59,10 +76,150 @@ def model_to_dict(model: Model) -> dict[str, Any]:
     Returns
     -------
     dict
-        Of texts, numbers, lists and dictionaries only, as TOML and JSON hold them.
+        Of texts, numbers, lists and dictionaries only, as JSON holds them. Laws, formulas and
+        numbers are rebuilt by `model_from_dict`; of a Python function only the text is kept.
     """
     return {
         "kernel": _kernel_to_dict(model.kernel),
-        "processes": [_process_to_dict(p) for p in model.processes],
+        "processes": [{"name": p.name, **_fields(p)} for p in model.processes],
         "initial": _initial_to_dict(model.initial),
     }
+
+
+class _Reader:
+    """Rebuilds the parts of a model and notes every mistake."""
+
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+
+    def table(self, what: str, given: Any, names: Sequence[str]) -> tuple[str, dict[str, Any]]:
+        """Take a table apart into its name, "" if that is not one of `names`, and the rest."""
+        if not isinstance(given, Mapping):
+            self.problems.append(f"{what} = {given!r}: must be a table with a 'name'")
+            return "", {}
+        name = given.get("name")
+        if name not in names:
+            value = f"name = {name!r} is unknown" if "name" in given else "'name' is missing"
+            self.problems.append(f"{what}: {value}{did_you_mean(str(name), names)}")
+            return "", {}
+        return str(name), {str(k): v for k, v in given.items() if k != "name"}
+
+    def build(self, what: str, kind: Callable[..., T], given: Mapping[str, Any]) -> T | None:
+        """Make a dataclass of its fields."""
+        known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
+        wrong = [
+            f"{what}: there is no parameter {k!r}{did_you_mean(k, list(known)) if known else ''}"
+            for k in given
+            if k not in known
+        ]
+        wrong += [
+            f"{what}: the parameter {name!r} is missing"
+            for name, f in known.items()
+            if name not in given and f.default is MISSING and f.default_factory is MISSING
+        ]
+        wrong += [
+            f"{what}: {k} is the Python function {v[FUNCTION]!r}, which no file can bring back; "
+            "make the model in Python again"
+            for k, v in given.items()
+            if isinstance(v, Mapping) and FUNCTION in v
+        ]
+        self.problems += wrong
+        return None if wrong else self.attempt(what, kind, **given)
+
+    def attempt(self, what: str, make: Callable[..., T], *args: Any, **given: Any) -> T | None:
+        """Call a constructor."""
+        try:
+            return make(*args, **given)
+        except InputError as error:
+            self.problems += error.problems
+        except (TypeError, ValueError, OverflowError) as error:
+            self.problems.append(f"{what}: {error}")
+        return None
+
+    def kernel(self, given: Any) -> Kernel | None:
+        """Rebuild a law or a formula."""
+        laws = {k.name: k for k in kernels.KERNELS}
+        if isinstance(given, Mapping) and FUNCTION in given:
+            self.problems.append(
+                f"kernel: is the Python function {given[FUNCTION]!r}, which no file can bring "
+                "back; wrap it again with smolux.kernels.from_function"
+            )
+            return None
+        name, rest = self.table("kernel", given, [*laws, "formula"])
+        if name == "formula":
+            text = rest.pop("formula", None)
+            if not isinstance(text, str):
+                hint = 'must be a text such as "(i + j)/2"'
+                self.problems.append(f"kernel: formula = {text!r}: {hint}")
+                return None
+            return self.attempt("kernel", kernels.formula, text, **rest)
+        return self.build(f"kernel {name!r}", laws[name], rest) if name else None
+
+    def process(self, given: Any) -> PairProcess | None:
+        """Rebuild a process."""
+        kinds = {p.name: p for p in PROCESSES}
+        name, rest = self.table("process", given, list(kinds))
+        return self.build(f"process {name!r}", kinds[name], rest) if name else None
+
+    def initial(self, given: Any) -> Initial | None:
+        """Rebuild an initial condition."""
+        kinds = {i.name: i for i in INITIALS}
+        name, rest = self.table("initial", given, [*kinds, "monodisperse"])
+        if name == "monodisperse":
+            return self.attempt("initial 'monodisperse'", monodisperse, **rest)
+        if name != Sizes.name:
+            return self.build(f"initial {name!r}", kinds[name], rest) if name else None
+        densities = rest.pop("densities", None)
+        if rest or not isinstance(densities, Mapping):
+            self.problems.append(
+                f"initial 'sizes': needs 'densities' and nothing else, "
+                f'such as {{"1": 0.5, "2": 0.5}}; found {sorted(given)}'
+            )
+            return None
+        return self.attempt(
+            "initial 'sizes'", lambda: from_sizes({int(k): float(v) for k, v in densities.items()})
+        )
+
+
+def model_from_dict(data: Mapping[str, Any]) -> Model:
+    """Rebuild a model from what `model_to_dict` wrote.
+
+    Parameters
+    ----------
+    data : mapping
+        With the keys ``kernel``, ``processes`` and ``initial``; the last two may be left out, as in
+        `smolux.Model`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    InputError
+        With every problem found: unknown names and parameters (and the nearest known one), wrong
+        values, Python functions, of which a file holds only the text.
+    """
+    if not isinstance(data, Mapping):
+        raise InputError(f"model = {data!r}: must be a dictionary with the key 'kernel'")
+    known = ("kernel", "processes", "initial")
+    reader = _Reader()
+    reader.problems += [
+        f"model: there is no key {k!r}{did_you_mean(str(k), known)}" for k in data if k not in known
+    ]
+    parts: dict[str, Any] = {}
+    if "kernel" in data:
+        parts["kernel"] = reader.kernel(data["kernel"])
+    else:
+        reader.problems.append("model: the key 'kernel' is missing")
+    if "processes" in data:
+        given = data["processes"]
+        if isinstance(given, Sequence) and not isinstance(given, str):
+            parts["processes"] = tuple(reader.process(p) for p in given)
+        else:
+            reader.problems.append(f"processes = {given!r}: must be a list of tables")
+    if "initial" in data:
+        parts["initial"] = reader.initial(data["initial"])
+    if reader.problems:
+        raise InputError(reader.problems)
+    return Model(**parts)

@@ -160,7 +160,7 @@ def to_dataset(model: Model, records: Records) -> xr.Dataset:
     units: Mapping[str, str] = records.attributes.get("units") or {}
     replicas = np.shape(records.number_density)[0]
     ragged = _ragged(records)
-    coordinates = {
+    coordinates: dict[str, Any] = {
         "replica": np.arange(replicas),
         "time": np.asarray(records.times, float),
         "order": np.asarray(records.orders, float),
