@@ -9,9 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .boxes import subdivided
+from .callables import Function
 from .errors import InputError
+from .formula import Formula, parse
+from .intervals import Interval
 
 Float = NDArray[np.float64]
+
+#: times at which a function that intervals do not follow is tried
+_SAMPLES = 257
+_MARGIN = 0.1
+#: a lower bound that is negative by no more than this share of the upper one is rounding
+_ROUNDING = 1e-12
 
 
 def _number(t: Any, value: Any) -> Any:
@@ -24,22 +34,22 @@ class TimeFunction:
 
     Attributes
     ----------
-    rate : callable
-        ``rate(t, *parameters) -> float``: plain Python that Numba can compile.
-    parameters : tuple of float
     text : str
-        For case files and messages.
+        For case files and messages: the number, the formula, or the name of the function.
+    parameters : tuple of float
+        What `rate` takes after the time.
     constant : float or None
-        The value if it does not depend on time.
-    rigorous : bool
-        Whether `bounds` is proved, or sampled.
+        The value, if it does not depend on time.
+    formula : Formula or None
+    user : smolux.callables.Function or None
+        At most one of the three is given.
     """
 
-    rate: Callable[..., Any]
-    parameters: tuple[float, ...]
     text: str
-    constant: float | None
-    rigorous: bool
+    parameters: tuple[float, ...] = ()
+    constant: float | None = None
+    formula: Formula | None = None
+    user: Function | None = None
 
     @classmethod
     def of(cls, value: Any, what: str = "the function of time") -> TimeFunction:
@@ -47,37 +57,106 @@ class TimeFunction:
 
         Parameters
         ----------
-        value : float, callable or TimeFunction
+        value : float, callable, str or TimeFunction
+            A number; a plain Python function ``f(t)``, whose further arguments have defaults; or a
+            formula in ``t`` such as ``"0.01 * (1 - t/400)"``, see `smolux.formula`.
         what : str
             What it stands for, for messages.
+
+        Raises
+        ------
+        InputError
+            If it is none of these, or negative or not finite at ``t = 0``.
         """
         if isinstance(value, cls):
             return value
-        if callable(value):
-            new = cls(value, (), getattr(value, "__name__", repr(value)), None, False)
+        if isinstance(value, str):
+            expression = parse(value, ("t",), what)
+            if expression.names:
+                new = cls(value, formula=expression)
+            else:
+                number = float(expression.evaluate())
+                new = cls(value, (number,), number)
         elif isinstance(value, (int, float, np.number)) and not isinstance(value, bool):
-            new = cls(_number, (float(value),), repr(float(value)), float(value), True)
+            new = cls(repr(float(value)), (float(value),), float(value))
+        elif callable(value):
+            user = Function.of(value, ("t",), what)
+            new = cls(user.text, user.defaults, user=user)
         else:
-            raise InputError(f"{what} = {value!r}: must be a number, a function f(t) or a formula")
-        start = float(new(0.0))
-        if not (np.isfinite(start) and start >= 0):
             raise InputError(
-                f"{what} = {new.text}: is {start} at t = 0; must be a finite number, zero or more"
+                f"{what} = {value!r}: must be a number, a function f(t) or a formula in t "
+                'such as "0.01 * (1 - t/400)"'
             )
+        new._check_start(what)
         return new
 
+    def _check_start(self, what: str) -> None:
+        where = f"{what} = {self.text}"
+        try:
+            start = self(0.0)
+        except Exception as error:  # a user's function may raise anything
+            raise InputError(
+                f"{where}: raises {type(error).__name__} at t = 0: {error}; correct the function"
+            ) from error
+        if not (np.isfinite(start) and start >= 0):
+            when = "" if self.constant is not None else " at t = 0"
+            raise InputError(f"{where}: is {start:g}{when}; must be a finite number, zero or more")
+
+    @property
+    def rate(self) -> Callable[..., Any]:
+        """``rate(t, *parameters) -> float``: plain Python that Numba compiles.
+
+        The same object for equal functions.
+        """
+        if self.formula is not None:
+            return self.formula.function(("t",))
+        return _number if self.user is None else self.user.function
+
+    @property
+    def rigorous(self) -> bool:
+        """Whether `bounds` is proved: for numbers and formulas."""
+        return self.user is None
+
     def __call__(self, t: ArrayLike) -> Any:
-        """Evaluate at one time or at an array of times."""
-        if np.ndim(t) == 0:
-            return float(self.rate(float(t), *self.parameters))  # type: ignore[arg-type]
-        return np.array([self.rate(x, *self.parameters) for x in np.ravel(t)], float).reshape(
-            np.shape(t)
-        )
+        """Evaluate at one time (a float) or at an array of times (an array)."""
+        if self.user is not None:
+            values = self.user.evaluate((t,), self.parameters)
+        elif self.formula is not None:
+            values = self.formula.evaluate(t=t)
+        else:
+            values = np.full(np.shape(t), self.constant)
+        return values if np.ndim(t) else float(values)
 
     def bounds(self, t0: float, t1: float) -> tuple[float, float]:
-        """Bounds over the times ``t0 <= t <= t1``."""
+        """Bounds over the times ``t0 <= t <= t1``.
+
+        By interval arithmetic for formulas, and for Python functions that it can follow; other
+        functions are sampled, and a margin is added.
+
+        Returns
+        -------
+        lower, upper : float
+            Infinite if the function is not bounded. A function that turns negative has a negative
+            lower bound.
+        """
         if self.constant is not None:
             return self.constant, self.constant
-        values = self(np.linspace(t0, t1, 257))
+        try:
+            found = subdivided(self._interval, t0, t1, 0.0, 0.0, 8, geometric=False, tolerance=0.01)
+        except TypeError:
+            return self._sampled(t0, t1)
+        low, high = float(found[0]), float(found[1])
+        return (0.0 if -_ROUNDING * high <= low < 0 else low), high
+
+    def _interval(self, t: Interval, _: Interval) -> Interval:
+        if self.user is not None:
+            return self.user.interval((t,), self.parameters)
+        assert self.formula is not None
+        return self.formula.interval(t=t)
+
+    def _sampled(self, t0: float, t1: float) -> tuple[float, float]:
+        values = self(np.linspace(t0, t1, _SAMPLES))
         low, high = float(values.min()), float(values.max())
-        return low - 0.1 * (high - low), high + 0.1 * (high - low)
+        margin = _MARGIN * (high - low)
+        # A function that is not seen to be negative is not taken to be.
+        return (max(low - margin, 0.0) if low >= 0 else low - margin), high + margin

@@ -3,25 +3,35 @@
 from .additive import Additive
 from .ballistic import Ballistic
 from .base import Kernel
+from .bilinear import Bilinear
+from .brownian import Brownian
 from .constant import Constant
+from .formula_kernel import FormulaKernel, formula
+from .function import FunctionKernel, from_function
 from .generalized_brownian import GeneralizedBrownian
 from .multiplicative import Multiplicative
-
-#: every law; the name in a case file is its ``name``
-KERNELS: tuple[type[Kernel], ...] = (
-    Constant,
-    Additive,
-    Multiplicative,
-    Ballistic,
-    GeneralizedBrownian,
-)
+from .product import Product
+from .registry import KERNELS, by_name, from_dict
+from .sedimentation import Sedimentation
+from .shear import Shear
 
 __all__ = [
     "KERNELS",
     "Additive",
     "Ballistic",
+    "Bilinear",
+    "Brownian",
     "Constant",
+    "FormulaKernel",
+    "FunctionKernel",
     "GeneralizedBrownian",
     "Kernel",
     "Multiplicative",
+    "Product",
+    "Sedimentation",
+    "Shear",
+    "by_name",
+    "formula",
+    "from_dict",
+    "from_function",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -9,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .base import Float, Kernel, check_parameters, widen
+from .base import BOLTZMANN, Float, Kernel, check_parameters, check_positive, widen
 
 
 def _rate(i: Any, j: Any, scale: Any) -> Any:
@@ -33,19 +34,44 @@ class Ballistic(Kernel):
 
     References
     ----------
-    S. K. Friedlander, Smoke, Dust, and Haze, 2nd ed. (Oxford, 2000), eq. (7.17).
+    S. K. Friedlander, Smoke, Dust, and Haze, 2nd ed. (Oxford, 2000), chapter 7.
     """
 
     scale: float = 1.0
     name: ClassVar[str] = "ballistic"
     formula: ClassVar[str] = "scale * (cbrt(i) + cbrt(j))**2 * sqrt(1/i + 1/j)"
-    reference: ClassVar[str] = (
-        "S. K. Friedlander, Smoke, Dust, and Haze, 2nd ed. (2000), eq. (7.17)"
-    )
+    reference: ClassVar[str] = "S. K. Friedlander, Smoke, Dust, and Haze, 2nd ed. (2000), chapter 7"
+    constructors: ClassVar[tuple[str, ...]] = ("free_molecular",)
     rate: ClassVar[Callable[..., Any]] = staticmethod(_rate)
 
     def __post_init__(self) -> None:
         check_parameters(self)
+
+    @classmethod
+    def free_molecular(cls, temperature: float, density: float, volume: float) -> Ballistic:
+        """Rate in a dilute gas, in m³/s.
+
+        Parameters
+        ----------
+        temperature : float
+            In K.
+        density : float
+            Of the material of the particles, in kg/m³.
+        volume : float
+            Of the monomer, a sphere, in m³.
+
+        Notes
+        -----
+        ``K = pi (r_i + r_j)^2 sqrt(8 k T / pi (1/m_i + 1/m_j))``, the cross section times the mean
+        relative speed: particles much smaller than the mean free path of the gas. With
+        ``m = density i volume`` and ``r = (3 i volume / (4 pi))^{1/3}`` it is
+        ``scale = (3 volume / (4 pi))^{1/6} sqrt(6 k T / density)``.
+        """
+        check_positive(
+            "Ballistic.free_molecular", temperature=temperature, density=density, volume=volume
+        )
+        size = (3.0 * volume / (4.0 * math.pi)) ** (1.0 / 6.0)
+        return cls(size * math.sqrt(6.0 * BOLTZMANN * temperature / density))
 
     @property
     def degree(self) -> float:
@@ -60,11 +86,11 @@ class Ballistic(Kernel):
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:
         """See `Kernel.bounds`; both are attained.
 
-        With ``x = (i/j)^{1/3}`` the law is ``j^{1/6} (1 + x)^2 sqrt(1 + x^{-3})``, whose logarithmic
-        derivative in x has the sign of ``4 x^4 + x - 3``: along either size it falls, then grows.
-        So the maximum over a box lies in a corner. The minimum over i lies at ``i = r j`` (r < 1), or
-        at the end of the range next to it; as a function of j that minimum falls up to ``j = r a``
-        and grows beyond.
+        With ``x = (i/j)^{1/3}`` the law is ``j^{1/6} (1 + x)^2 sqrt(1 + x^{-3})``, whose
+        logarithmic derivative in x has the sign of ``4 x^4 + x - 3``: along either size it falls,
+        then grows. So the maximum over a box lies in a corner. The minimum over i lies at
+        ``i = r j`` with r < 1, or at the end of the range next to it; as a function of j that
+        minimum falls up to ``j = r a`` and grows beyond.
         """
         a, b, c, d = (np.asarray(x, float) for x in (a, b, c, d))
         upper = np.maximum(np.maximum(self(a, c), self(a, d)), np.maximum(self(b, c), self(b, d)))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
+from smolux.errors import InputError
 
 Float = NDArray[np.float64]
+
+#: Boltzmann constant in J/K, exact in the SI
+BOLTZMANN = 1.380649e-23
 
 #: bounds are widened by this share, so that rounding, which differs between NumPy and compiled
 #: code, never breaks them
@@ -23,8 +26,8 @@ class Kernel:
     """A collision rate ``K(i, j)`` of particles of sizes ``i`` and ``j``.
 
     A law is one frozen dataclass: its fields are the parameters, in the order in which `rate`
-    takes them after the two sizes. An unordered pair of particles in a volume ``V`` meets at the rate
-    ``K(i, j) / V``.
+    takes them after the two sizes. An unordered pair of particles in a volume ``V`` meets at the
+    rate ``K(i, j) / V``.
 
     Attributes
     ----------
@@ -33,7 +36,7 @@ class Kernel:
     formula : str
         The law as text, in the language of `smolux.formula`.
     cheap : bool
-        Whether an evaluation costs no more than reading a table, so that methods do not tabulate it.
+        Whether an evaluation costs no more than reading a table; methods then do not tabulate it.
     """
 
     name: ClassVar[str]
@@ -45,7 +48,12 @@ class Kernel:
     #: key of the closed-form solution in `smolux.exact`, for monodisperse starts
     exact: ClassVar[str | None] = None
 
-    #: ``rate(i, j, *parameters) -> float``: plain Python that Numba can compile; sizes come as floats
+    #: parameters for examples and tests, where there is no default
+    example: ClassVar[Mapping[str, float]] = {}
+    #: names of the classmethods that make the law from physical quantities, in SI units
+    constructors: ClassVar[tuple[str, ...]] = ()
+
+    #: ``rate(i, j, *parameters) -> float``: plain Python that Numba compiles; sizes are floats
     rate: ClassVar[Callable[..., Any]]
 
     @property
@@ -54,23 +62,34 @@ class Kernel:
         return tuple(float(getattr(self, f.name)) for f in fields(self))
 
     @property
+    def label(self) -> str:
+        """What messages call the law."""
+        return repr(self.name)
+
+    @property
     def degree(self) -> float | None:
-        """Homogeneity degree: ``K(c i, c j) = c**degree K(i, j)``; None if not homogeneous or unknown."""
+        """Homogeneity degree, ``K(c i, c j) = c**degree K(i, j)``; None if there is none known."""
         return None
 
     @property
     def gels(self) -> bool | None:
-        """Whether mass is lost to an infinite cluster in finite time; None if unknown."""
+        """Whether aggregation alone loses mass to a gel in finite time; None if unknown.
+
+        In the rate equations of the infinite system. Kernels that gel at once (their `gel_time` is
+        zero) do so in a finite system after a time that falls slowly as it grows.
+        """
         return None
 
     def gel_time(self) -> float | None:
-        """Gelation time for monomers of unit density; None if unknown or if the kernel does not gel."""
+        """Gelation time for monomers of unit density; None if unknown or without gelation."""
         return None
 
     def __call__(self, i: ArrayLike, j: ArrayLike) -> Float:
         """Evaluate the law on arrays of sizes, broadcast against each other."""
         i, j = np.broadcast_arrays(np.asarray(i, float), np.asarray(j, float))
-        return np.asarray(self.rate(i, j, *self.parameters), float) + np.zeros(i.shape)
+        with np.errstate(all="ignore"):
+            values = self.rate(i, j, *self.parameters)
+        return np.array(np.broadcast_to(np.asarray(values, float), i.shape))
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:
         """Bounds of the law over boxes of sizes ``a <= i <= b``, ``c <= j <= d``.
@@ -95,8 +114,35 @@ class Kernel:
         return None
 
     def problems(self, largest: float = 1.0) -> list[str]:
-        """What is wrong with the law on a sample of sizes; empty for the laws of this package."""
-        return []
+        """Return what is wrong with the law on a sample of sizes.
+
+        Asymmetric, negative, not finite, or an error: with the sizes, the value and the cure. The
+        sample holds small sizes, and powers of two and their neighbours up to `largest` or
+        2**20, whichever is more: what a kernel does beyond the sizes that are commonly reached is
+        not held against it.
+
+        Parameters
+        ----------
+        largest : float
+            The largest size at the start.
+        """
+        from .check import law_problems
+
+        return law_problems(self, largest)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the law as plain data, as in a case file: ``name`` and the parameters."""
+        return {"name": self.name, **{f.name: float(getattr(self, f.name)) for f in fields(self)}}
+
+    def describe(self) -> dict[str, Any]:
+        """Return what is known of the law as plain data, for provenance."""
+        return {
+            **self.to_dict(),
+            "formula": self.formula,
+            "degree": self.degree,
+            "gels": self.gels,
+            "reference": self.reference,
+        }
 
 
 def check_parameters(kernel: Kernel, **ranges: tuple[float, float]) -> None:
@@ -128,6 +174,25 @@ def check_parameters(kernel: Kernel, **ranges: tuple[float, float]) -> None:
             low, high = ranges[f.name]
             limits = f"from {low:g} to {high:g}" if high < np.inf else f"at least {low:g}"
             problems.append(f"{where}: must be {limits}")
+    if problems:
+        raise InputError(problems)
+
+
+def check_positive(what: str, **values: float) -> None:
+    """Check the physical quantities of a constructor.
+
+    Raises
+    ------
+    InputError
+        With every problem found.
+    """
+    problems = [
+        f"{what}: {key} = {value!r}: must be a positive finite number"
+        for key, value in values.items()
+        if isinstance(value, bool)
+        or not isinstance(value, (int, float, np.number))
+        or not (np.isfinite(value) and value > 0)
+    ]
     if problems:
         raise InputError(problems)
 

@@ -19,7 +19,7 @@ def _rate(i: Any, j: Any, a: Any, scale: Any) -> Any:
 
 @dataclass(frozen=True)
 class GeneralizedBrownian(Kernel):
-    """Rate of unequal sizes: ``K(i, j) = scale ((i/j)^a + (j/i)^a)``.
+    """Brownian with any exponent: ``K(i, j) = scale ((i/j)^a + (j/i)^a)``.
 
     Parameters
     ----------
@@ -38,6 +38,7 @@ class GeneralizedBrownian(Kernel):
     name: ClassVar[str] = "generalized-brownian"
     formula: ClassVar[str] = "scale * ((i/j)**a + (j/i)**a)"
     reference: ClassVar[str] = "S. A. Matveev et al., Phys. Rev. Lett. 119, 260601 (2017)"
+    example: ClassVar[dict[str, float]] = {"a": 0.95}
     rate: ClassVar[Callable[..., Any]] = staticmethod(_rate)
 
     def __post_init__(self) -> None:

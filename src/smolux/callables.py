@@ -1,0 +1,228 @@
+"""A user's plain Python function of numbers: checked, run on arrays and on intervals."""
+
+from __future__ import annotations
+
+import builtins
+import inspect
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache, reduce
+from types import BuiltinFunctionType, FunctionType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InputError, did_you_mean
+from .intervals import Interval
+
+Float = NDArray[np.float64]
+
+#: entries of an array result that are compared with calls on single numbers
+_COMPARED = 24
+
+_ARRAY_MATH = {
+    name: getattr(np, numpy_name)
+    for name, numpy_name in {
+        "sqrt": "sqrt", "cbrt": "cbrt", "exp": "exp", "expm1": "expm1", "log": "log",
+        "log2": "log2", "log10": "log10", "log1p": "log1p", "fabs": "absolute", "pow": "power",
+        "sin": "sin", "cos": "cos", "tanh": "tanh", "atan": "arctan", "floor": "floor",
+        "ceil": "ceil", "hypot": "hypot",
+    }.items()
+    if hasattr(math, name)
+}  # fmt: skip
+_ARRAY_MATH["log"] = lambda x, *base: np.log(x) / np.log(base[0]) if base else np.log(x)
+
+
+@dataclass(frozen=True)
+class Function:
+    """A user's function; made by `of`.
+
+    Attributes
+    ----------
+    function : callable
+        The plain Python function.
+    names, defaults : tuple
+        Its parameters after the leading arguments, and their values.
+    """
+
+    function: Callable[..., Any]
+    names: tuple[str, ...]
+    defaults: tuple[float, ...]
+
+    @classmethod
+    def of(cls, function: Any, arguments: tuple[str, ...], what: str) -> Function:
+        """Take a function apart.
+
+        Parameters
+        ----------
+        function : callable
+            A Python function of `arguments`, whose further arguments have numbers as defaults. A
+            compiled (Numba) function is taken for the Python function it was made from.
+        arguments : tuple of str
+            What the leading arguments stand for.
+        what : str
+            What the function stands for, for messages.
+
+        Raises
+        ------
+        InputError
+            If it is no plain function or its signature does not fit.
+        """
+        plain = getattr(function, "py_func", function)
+        example = f"def f({', '.join(arguments)}, a=1.0)"
+        if not isinstance(plain, FunctionType):
+            raise InputError(f"{what} = {function!r}: must be a Python function such as {example}")
+        problems, names, defaults = [], [], []
+        found = list(inspect.signature(plain).parameters.values())
+        where = f"{what} = {plain.__name__}{inspect.signature(plain)}"
+        if any(p.kind not in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) for p in found):
+            problems.append(f"{where}: give each argument by name, no *args, **kwargs or * alone")
+        elif len(found) < len(arguments):
+            problems.append(f"{where}: needs {len(arguments)} arguments, as {example}")
+        for p in found[len(arguments) :] if not problems else ():
+            if p.default is p.empty:
+                problems.append(f"{where}: argument {p.name!r} needs a default, as {p.name}=1.0")
+                continue
+            problems += wrong_number(p.default, f"{where}: the default of {p.name!r}")
+            names.append(p.name)
+            defaults.append(p.default)
+        if problems:
+            raise InputError(problems)
+        return cls(plain, tuple(names), tuple(float(value) for value in defaults))
+
+    def values(self, given: dict[str, Any], what: str) -> tuple[float, ...]:
+        """Return the parameters, with those that are given in place of the defaults."""
+        problems = []
+        for name, value in given.items():
+            if name not in self.names:
+                cure = did_you_mean(name, self.names) if self.names else "; it takes none"
+                problems.append(f"{what}: unknown parameter {name!r} of {self.text}{cure}")
+            problems += wrong_number(value, f"{what}: parameter {name!r}")
+        if problems:
+            raise InputError(problems)
+        pairs = zip(self.names, self.defaults, strict=True)
+        return tuple(float(given.get(name, value)) for name, value in pairs)
+
+    @property
+    def text(self) -> str:
+        """The name of the function."""
+        return self.function.__name__
+
+    @property
+    def source(self) -> str | None:
+        """The source text, if there is any."""
+        try:
+            return inspect.cleandoc("\n" + inspect.getsource(self.function))
+        except (OSError, TypeError):
+            return None
+
+    def scalar(self, arguments: tuple[float, ...], parameters: tuple[float, ...]) -> float:
+        """Call with single numbers."""
+        with np.errstate(all="ignore"):
+            return float(self.function(*(np.float64(x) for x in arguments), *parameters))
+
+    def evaluate(self, arguments: tuple[ArrayLike, ...], parameters: tuple[float, ...]) -> Float:
+        """Call with arrays: at once if the function allows it, else entry by entry.
+
+        A function of single numbers may misread arrays without an error, so some entries are
+        compared with calls on single numbers.
+        """
+        arrays = np.broadcast_arrays(*(np.asarray(x, float) for x in arguments))
+        flat = [np.ascontiguousarray(x).ravel() for x in arrays]
+        result = self._at_once(flat, parameters)
+        if result is None:
+            values = [self.scalar(entry, parameters) for entry in zip(*flat, strict=True)]
+            result = np.array(values, float)
+        return result.reshape(arrays[0].shape)
+
+    def _at_once(self, flat: list[Float], parameters: tuple[float, ...]) -> Float | None:
+        size = flat[0].size
+        if size < _COMPARED:
+            return None
+        try:
+            with np.errstate(all="ignore"):
+                found = np.asarray(_for_arrays(self.function)(*flat, *parameters))
+            if found.shape not in ((), (size,)) or found.dtype.kind not in "fiub":
+                return None
+            result = np.array(np.broadcast_to(found, (size,)), float)
+        except Exception:  # whatever it is: the function is not one of arrays
+            return None
+        # Spread by the golden ratio: never in step with the rows of a matrix.
+        spread = np.modf(np.arange(1, _COMPARED) * 0.6180339887498949)[0] * size
+        index = np.concatenate([spread.astype(int), [0, size - 1]])
+        single = [self.scalar(tuple(x[k] for x in flat), parameters) for k in index]
+        same = np.allclose(result[index], single, rtol=1e-9, atol=0.0, equal_nan=True)
+        return result if same else None
+
+    def interval(self, arguments: tuple[Interval, ...], parameters: tuple[float, ...]) -> Interval:
+        """Bounds of the function over intervals.
+
+        Raises
+        ------
+        TypeError
+            If the function compares its arguments or calls what intervals do not follow.
+        """
+        try:
+            found = _for_arrays(self.function)(*arguments, *parameters)
+        except Exception as error:
+            raise TypeError(f"{self.text} cannot be followed: {error}") from error
+        if isinstance(found, Interval):
+            return found
+        if isinstance(found, (int, float, np.number)):
+            return Interval(float(found))
+        raise TypeError(f"{self.text} cannot be followed: it returned {type(found).__name__}")
+
+
+def wrong_number(value: Any, where: str) -> list[str]:
+    """Return a message unless the value is a finite number."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+        return [f"{where} = {value!r}: must be a number"]
+    return [] if np.isfinite(value) else [f"{where} = {value!r}: must be a finite number"]
+
+
+@lru_cache(maxsize=256)
+def _for_arrays(function: FunctionType) -> Callable[..., Any]:
+    """Copy a function so that `math`, `min` and `max` work on arrays and intervals.
+
+    The functions that it calls by a global name are copied likewise.
+    """
+    return _copy(function, {})
+
+
+def _copy(function: FunctionType, done: dict[FunctionType, FunctionType]) -> FunctionType:
+    if function in done:
+        return done[function]
+    space: dict[str, Any] = dict(function.__globals__)
+    copy = FunctionType(
+        function.__code__, space, function.__name__, function.__defaults__, function.__closure__
+    )
+    copy.__kwdefaults__ = function.__kwdefaults__
+    done[function] = copy
+    # Built-in names first: globals of the user hide them.
+    for name, replacement in _BUILTINS.items():
+        if space.get(name, getattr(builtins, name)) is getattr(builtins, name):
+            space[name] = replacement
+    for name in function.__code__.co_names:
+        value = space.get(name)
+        called = getattr(value, "py_func", value)
+        if value is math:
+            space[name] = SimpleNamespace(**{**vars(math), **_ARRAY_MATH})
+        elif isinstance(value, BuiltinFunctionType) and value.__module__ == "math":
+            space[name] = _ARRAY_MATH.get(value.__name__, value)
+        elif isinstance(called, FunctionType) and not called.__module__.startswith("numpy"):
+            space[name] = _copy(called, done)
+    return copy
+
+
+def _pairwise(ufunc: Any) -> Callable[..., Any]:
+    def chosen(*values: Any) -> Any:
+        if len(values) < 2:
+            raise TypeError("not followed: an iterable")
+        return reduce(ufunc, values)
+
+    return chosen
+
+
+_BUILTINS = {"min": _pairwise(np.minimum), "max": _pairwise(np.maximum)}

@@ -1,0 +1,120 @@
+"""What a user's kernel may get wrong, found on a sample of sizes."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from .base import Kernel
+
+Float = NDArray[np.float64]
+
+#: all sizes up to this are in the sample
+_SMALL = 16
+#: sizes up to this power of two are reached by a common simulation
+_REACHED = 20
+#: relative difference of K(i, j) and K(j, i) that rounding may explain
+_ASYMMETRY = 1e-9
+
+
+def sample_sizes(largest: float) -> Float:
+    """Return the sizes a law is checked at: small ones, then powers of two and neighbours."""
+    top = min(max(_REACHED, math.ceil(math.log2(max(largest, 1.0)))), 62)
+    powers = 2.0 ** np.arange(5, top + 1)
+    return np.unique(
+        np.concatenate([np.arange(1.0, _SMALL + 1), powers, powers[::3] - 1, powers[1::3] + 1])
+    )
+
+
+def law_problems(kernel: Kernel, largest: float) -> list[str]:
+    """Return what is wrong with a law; see `Kernel.problems`."""
+    where = f"kernel {kernel.label}"
+    sizes = sample_sizes(largest)
+    i, j = (x.ravel() for x in np.meshgrid(sizes, sizes, indexing="ij"))
+    order = np.argsort(np.maximum(i, j), kind="stable")  # the smallest sizes are named first
+    i, j = i[order], j[order]
+    try:
+        values, mirrored = kernel(i, j), kernel(j, i)
+    except Exception as error:  # a user's function may raise anything
+        return [_raised(kernel, where, i, j, error)]
+    problems = []
+
+    def report(wrong: NDArray[np.bool_], verdict: str) -> None:
+        index = np.flatnonzero(wrong)
+        if len(index):
+            first = index[0]
+            more = f" (and {len(index) - 1} more pairs of the sample)" if len(index) > 1 else ""
+            pair = f"K({i[first]:.0f}, {j[first]:.0f}) = {values[first]:.6g}"
+            problems.append(f"{where}: {pair}{more}: {verdict}")
+
+    finite = np.isfinite(values)
+    report(
+        np.isnan(values), "not a number; look for 0/0 or a root or logarithm of a negative number"
+    )
+    report(
+        np.isinf(values), "infinite; limit what grows, as in exp(min(x, 700)), or divides by zero"
+    )
+    report(finite & (values < 0), "negative; a rate is zero or more, as in max(K, 0)")
+    with np.errstate(all="ignore"):
+        gap = np.abs(values - mirrored) > _ASYMMETRY * np.maximum(np.abs(values), np.abs(mirrored))
+    index = np.flatnonzero(gap & finite & np.isfinite(mirrored))
+    if len(index):
+        first = index[0]
+        report(
+            gap & finite & np.isfinite(mirrored),
+            f"not symmetric, as K({j[first]:.0f}, {i[first]:.0f}) = {mirrored[first]:.6g}; "
+            "a pair has no order: take for example the mean of both",
+        )
+    if finite.all() and not values.any():
+        problems.append(
+            f"{where}: is zero for every pair of the sample: nothing would ever collide"
+        )
+    return problems + _declared(kernel, where, sizes, values, i, j)
+
+
+def _raised(kernel: Kernel, where: str, i: Float, j: Float, error: Exception) -> str:
+    for x, y in zip(i, j, strict=True):
+        try:
+            kernel(x, y)
+        except Exception as single:  # the same, now for one pair
+            name = type(single).__name__
+            return f"{where}: K({x:.0f}, {y:.0f}) raises {name}: {single}; correct the function"
+    return f"{where}: raises {type(error).__name__}: {error}; correct the function"
+
+
+def _declared(
+    kernel: Kernel, where: str, sizes: Float, values: Float, i: Float, j: Float
+) -> list[str]:
+    """Compare the degree and the bounds that the law states with its values."""
+    if not np.isfinite(values).all():
+        return []
+    problems = []
+    if kernel.degree is not None:
+        with np.errstate(all="ignore"):
+            expected = 2.0**kernel.degree * values
+            doubled = kernel(2 * i, 2 * j)
+            wrong = np.abs(doubled - expected) > 1e-6 * np.abs(expected) + 1e-300
+        if wrong.any():
+            k = np.flatnonzero(wrong)[0]
+            problems.append(
+                f"{where}: degree = {kernel.degree:g} is wrong: doubling the sizes ({i[k]:.0f}, "
+                f"{j[k]:.0f}) multiplies the rate by {doubled[k] / values[k]:.6g}, not "
+                f"{2.0**kernel.degree:.6g}; leave it out if the law is not homogeneous"
+            )
+    low, high = sizes[0], sizes[-1]
+    try:
+        lower, upper = (float(bound) for bound in kernel.bounds(low, high, low, high))
+    except Exception as error:  # bounds of the user
+        return [*problems, f"{where}: bounds raise {type(error).__name__}: {error}; correct them"]
+    wrong = ~((values >= lower * (1 - 1e-9)) & (values <= upper * (1 + 1e-9)))
+    if wrong.any() and kernel.rigorous:
+        k = np.flatnonzero(wrong)[0]
+        problems.append(
+            f"{where}: the bounds [{lower:g}, {upper:g}] of the sizes {low:.0f} to {high:.0f} do "
+            f"not hold: K({i[k]:.0f}, {j[k]:.0f}) = {values[k]:.6g}; correct or leave out `bounds`"
+        )
+    return problems

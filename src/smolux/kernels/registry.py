@@ -1,0 +1,111 @@
+"""Kernels by name, as in case files."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any
+
+from smolux.errors import InputError, did_you_mean
+
+from .additive import Additive
+from .ballistic import Ballistic
+from .base import Kernel
+from .bilinear import Bilinear
+from .brownian import Brownian
+from .constant import Constant
+from .formula_kernel import formula
+from .generalized_brownian import GeneralizedBrownian
+from .multiplicative import Multiplicative
+from .product import Product
+from .sedimentation import Sedimentation
+from .shear import Shear
+
+#: every law; the name in a case file is its ``name``
+KERNELS: tuple[type[Kernel], ...] = (
+    Constant,
+    Additive,
+    Multiplicative,
+    Bilinear,
+    Product,
+    Ballistic,
+    Brownian,
+    GeneralizedBrownian,
+    Shear,
+    Sedimentation,
+)
+
+
+def by_name(name: str) -> type[Kernel]:
+    """Return the law of this name.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    laws = {law.name: law for law in KERNELS}
+    if name not in laws:
+        raise InputError(f"kernel name = {name!r}: unknown{did_you_mean(str(name), list(laws))}")
+    return laws[name]
+
+
+def from_dict(table: Mapping[str, Any]) -> Kernel:
+    """Make a kernel of plain data, as in a case file.
+
+    Parameters
+    ----------
+    table : mapping
+        ``name`` and the parameters of the law. ``name = "brownian.continuum"`` calls a constructor
+        from physical quantities, in SI units; ``name = "formula"`` takes the text as ``formula``.
+
+    Returns
+    -------
+    Kernel
+
+    Raises
+    ------
+    InputError
+        With every problem found: an unknown name or parameter, a missing one, a wrong value.
+
+    Examples
+    --------
+    >>> from_dict({"name": "bilinear", "A": 0.5, "B": 0.25})
+    Bilinear(A=0.5, B=0.25, scale=1.0)
+    """
+    if not isinstance(table, Mapping) or not isinstance(table.get("name"), str):
+        raise InputError(f"kernel = {table!r}: needs a name, such as {{'name': 'ballistic'}}")
+    rest = {str(key): value for key, value in table.items() if key != "name"}
+    name = table["name"]
+    if name == "formula":
+        text = rest.pop("formula", None)
+        if text is None:
+            raise InputError('kernel \'formula\': needs formula = "...", such as "(i + j)/2"')
+        return formula(text, **rest)
+    make = _maker(name)
+    accepted = inspect.signature(make).parameters
+    problems = [
+        f"kernel {name!r}: unknown parameter {key!r}{did_you_mean(key, list(accepted))}"
+        for key in rest
+        if key not in accepted
+    ]
+    problems += [
+        f"kernel {name!r}: parameter {key!r} is missing"
+        for key, parameter in accepted.items()
+        if parameter.default is parameter.empty and key not in rest
+    ]
+    if problems:
+        raise InputError(problems)
+    kernel = make(**rest)
+    assert isinstance(kernel, Kernel)
+    return kernel
+
+
+def _maker(name: str) -> Any:
+    """Return the class, or the constructor after a point."""
+    law, _, constructor = name.partition(".")
+    known = [law.name for law in KERNELS] + ["formula"]
+    known += [f"{law.name}.{each}" for law in KERNELS for each in law.constructors]
+    if name not in known:
+        raise InputError(f"kernel name = {name!r}: unknown{did_you_mean(name, known)}")
+    return getattr(by_name(law), constructor) if constructor else by_name(law)

@@ -1,0 +1,83 @@
+"""The shear kernel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .base import Float, Kernel, check_parameters, check_positive, corners
+
+
+def _rate(i: Any, j: Any, scale: Any) -> Any:
+    width = np.cbrt(i) + np.cbrt(j)
+    return scale * (width * width * width)
+
+
+@dataclass(frozen=True)
+class Shear(Kernel):
+    """Spheres carried by a shear flow: ``K(i, j) = scale (i^{1/3} + j^{1/3})^3``.
+
+    Parameters
+    ----------
+    scale : float
+        Prefactor, volume per time.
+
+    References
+    ----------
+    M. v. Smoluchowski, Z. Phys. Chem. 92, 129 (1917), doi:10.1515/zpch-1918-9209.
+    """
+
+    scale: float = 1.0
+    name: ClassVar[str] = "shear"
+    formula: ClassVar[str] = "scale * (cbrt(i) + cbrt(j))**3"
+    reference: ClassVar[str] = "M. v. Smoluchowski, Z. Phys. Chem. 92, 129 (1917)"
+    constructors: ClassVar[tuple[str, ...]] = ("laminar",)
+    rate: ClassVar[Callable[..., Any]] = staticmethod(_rate)
+
+    def __post_init__(self) -> None:
+        check_parameters(self)
+
+    @classmethod
+    def laminar(cls, gradient: float, volume: float) -> Shear:
+        """Rate in a laminar shear flow, ``K = (4/3) G (r_i + r_j)^3``, in m³/s.
+
+        Parameters
+        ----------
+        gradient : float
+            Velocity gradient G, in 1/s.
+        volume : float
+            Volume of the monomer, a sphere, in m³.
+
+        Notes
+        -----
+        ``r = (3 i volume / (4 pi))^{1/3}``, so ``scale = G volume / pi``. Streamlines are taken for
+        straight.
+        """
+        check_positive("Shear.laminar", gradient=gradient, volume=volume)
+        return cls(gradient * volume / math.pi)
+
+    @property
+    def degree(self) -> float:
+        """See `Kernel.degree`."""
+        return 1.0
+
+    @property
+    def gels(self) -> bool:
+        """See `Kernel.gels`: never, as ``K <= 4 scale (i + j)``."""
+        return False
+
+    def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:
+        """See `Kernel.bounds`; the law grows with either size."""
+        return corners(self, (a, c), (b, d))
+
+    def factors(self, sizes: Float) -> tuple[Float, Float]:
+        """See `Kernel.factors`; rank 4, by the binomial theorem."""
+        sizes = np.asarray(sizes, float)
+        x, one = np.cbrt(sizes), np.ones(len(sizes))
+        left = np.array([sizes, 3 * x * x, 3 * x, one])
+        return self.scale * left, np.array([one, x, x * x, sizes])
