@@ -1,0 +1,334 @@
+"""The tables that say what happens: ``[kernel]``, ``[[processes]]``, ``[initial]``."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, fields
+from typing import Any
+
+from .. import units
+from ..errors import InputError, did_you_mean
+from ..initial import INITIALS, Initial, Sizes
+from ..kernels import KERNELS
+from ..kernels.base import Kernel
+from ..model import Model
+from ..model_dict import model_from_dict, model_to_dict
+from ..processes import PROCESSES
+from ..units import Dimension
+from .lines import Path
+from .reader import Problems, Table, show
+
+#: what the parameters of laws, processes and initial conditions measure; others are plain numbers
+FIELDS: dict[tuple[str, str], Dimension] = {
+    ("kernel", "scale"): units.KERNEL,
+    ("initial", "density"): units.NUMBER_DENSITY,
+    ("initial", "densities"): units.NUMBER_DENSITY,
+}
+
+#: what the arguments of physical constructors measure, by their names
+ARGUMENTS: dict[str, Dimension] = {
+    "temperature": units.TEMPERATURE,
+    "viscosity": units.VISCOSITY,
+    "kinematic_viscosity": units.KINEMATIC_VISCOSITY,
+    "dissipation": units.DISSIPATION,
+    "gradient": units.RATE,
+    "gravity": units.ACCELERATION,
+    "radius": units.LENGTH,
+    "volume": units.VOLUME,
+    "mass": units.MASS,
+    "density": units.MASS_DENSITY,
+    "density_difference": units.MASS_DENSITY,
+}
+
+_INITIALS = {i.name: i for i in INITIALS}
+
+
+@dataclass(frozen=True)
+class Physics:
+    """What the tables of a model say, ready to be built.
+
+    Attributes
+    ----------
+    data : dict
+        For `smolux.model_dict.model_from_dict`, in SI units or dimensionless.
+    origin : str
+        The quantities from which a physical constructor found the kernel, or nothing.
+    """
+
+    data: dict[str, Any]
+    origin: str = ""
+
+
+def read_physics(case: Mapping[str, Any], problems: Problems) -> Physics:
+    """Read the tables of the model; mistakes are noted in `problems`."""
+    data: dict[str, Any] = {}
+    origin = ""
+    if "kernel" in case:
+        data["kernel"], origin = _kernel(Table(case["kernel"], ("kernel",), problems))
+    else:
+        problems.add(
+            (), 'the table [kernel] is missing: give one with name = "constant" or another law'
+        )
+    if "processes" in case:
+        data["processes"] = _processes(case["processes"], problems)
+    if "initial" in case:
+        data["initial"] = _initial(Table(case["initial"], ("initial",), problems))
+    return Physics(data, origin)
+
+
+def build(physics: Physics, si: bool, problems: Problems) -> Model | None:
+    """Make the model; None, with the mistakes noted, if that fails."""
+    data = physics.data
+    if si:
+        _require_units(data, problems)
+    try:
+        return model_from_dict(data)
+    except InputError as error:
+        for message in error.problems:
+            problems.add(_place(message, data), message)
+    return None
+
+
+def _place(message: str, data: Mapping[str, Any]) -> Path:
+    """Find the key that a message of the model is about: a guess that only chooses the line."""
+    tables: list[tuple[Path, Mapping[str, Any]]] = []
+    for section in ("kernel", "initial"):
+        if isinstance(data.get(section), Mapping):
+            tables.append(((section,), data[section]))
+    tables += [(("processes", n), p) for n, p in enumerate(data.get("processes", ()))]
+
+    def likeness(entry: tuple[Path, Mapping[str, Any]]) -> int:
+        path, table = entry
+        # "kernel 'brownian': ...", "the shattering rate = ...", "initial density ..."
+        return 2 * (f"{table.get('name')}" in message) + (str(path[0])[:7] in message)
+
+    path, table = max(tables, key=likeness, default=((), {}))
+    for key in table:
+        if key != "name" and (f"{key} = " in message or f"{key!r}" in message):
+            return (*path, key)
+    return path
+
+
+# --- kernel -----------------------------------------------------------------------------------
+
+
+def _kernel(table: Table) -> tuple[dict[str, Any], str]:
+    laws = {k.name: k for k in KERNELS if k.name != "formula"}
+    if "formula" in table:
+        return _formula(table), ""
+    if "name" not in table:
+        hint = did_you_mean("", list(laws))
+        table.require(
+            "name", f'or give formula = "..."{hint.replace("; choose", "; choose a name")}'
+        )
+        return {}, ""
+    name = table.choice("name", None, list(laws))
+    if name is None:
+        return {}, ""
+    law = laws[name]
+    own = {f.name: f.default for f in fields(law)}
+    for constructor in getattr(law, "constructors", ()):
+        arguments = _signature(law, constructor)
+        if any(a in table and a not in own for a in arguments):
+            return _constructed(table, law, constructor)
+    data = {"name": name, **_fields(table, "kernel", own)}
+    # what else could have stood here
+    table.known += [a for c in getattr(law, "constructors", ()) for a in _signature(law, c)]
+    table.finish()
+    return data, ""
+
+
+def _signature(law: type[Kernel], constructor: str) -> Mapping[str, inspect.Parameter]:
+    return inspect.signature(getattr(law, constructor)).parameters
+
+
+def _fields(table: Table, section: str, own: Mapping[str, Any]) -> dict[str, Any]:
+    """Read the parameters of a law or an initial condition."""
+    data = {}
+    for key, default in own.items():
+        dimension = FIELDS.get((section, key))
+        if key not in table:
+            table.known.append(key)
+            if default is MISSING:
+                table.require(key, "it has no default")
+        elif dimension is not None:
+            data[key] = table.quantity(key, None, dimension)
+        else:
+            data[key] = table.number(key, None)
+    return {k: v for k, v in data.items() if v is not None}
+
+
+def _constructed(table: Table, law: type[Kernel], constructor: str) -> tuple[dict[str, Any], str]:
+    """Read the arguments of a physical constructor, with units, and call it."""
+    make: Callable[..., Kernel] = getattr(law, constructor)
+    table.known.append("name")
+    given: dict[str, float] = {}
+    before = len(table.problems.messages)
+    for key, argument in _signature(law, constructor).items():
+        dimension = ARGUMENTS.get(key)
+        if key not in table:
+            table.known.append(key)
+            if argument.default is argument.empty:
+                table.require(
+                    key, f"give {dimension.words}, for example {show(dimension.example)}"
+                    if dimension else "it has no default"
+                )  # fmt: skip
+        elif dimension is None:
+            given[key] = table.number(key, None)
+        elif isinstance(table.content[key], str):
+            given[key] = table.quantity(key, None, dimension)
+        else:
+            table.take(key)
+            table.bad(key, f"needs its unit: {dimension.words}, such as {show(dimension.example)}")
+    table.finish()
+    if len(table.problems.messages) > before:
+        return {}, ""
+    try:
+        kernel = make(**given)
+    except InputError as error:
+        table.problems.add_error(table.path, error, list(given))
+        return {}, ""
+    data = {"name": law.name, **{f.name: getattr(kernel, f.name) for f in fields(kernel)}}
+    origin = ", ".join(f"{k} = {table.content[k]}" for k in given)
+    return data, f"scale by {law.__name__}.{constructor} from {origin}"
+
+
+def _formula(table: Table) -> dict[str, Any]:
+    name = table.take("name", "formula")
+    if name != "formula":
+        table.bad("name", "a kernel has a name or a formula, not both; take one out")
+    data: dict[str, Any] = {"name": "formula", "formula": table.text("formula", "")}
+    for key, value in table.content.items():
+        if key in ("name", "formula"):
+            continue
+        if key == "gels":
+            data[key] = table.flag(key, False)
+        elif isinstance(value, str):
+            # its dimension is not known: whatever it measures, in SI units
+            data[key] = table.anything(key)
+        else:
+            data[key] = table.number(key, None)
+    return {k: v for k, v in data.items() if v is not None}
+
+
+# --- processes and initial condition -----------------------------------------------------------
+
+
+def _processes(content: Any, problems: Problems) -> list[dict[str, Any]]:
+    if isinstance(content, Mapping):
+        problems.add(("processes",), "write [[processes]] with two brackets, once for each process")
+        return []
+    if not isinstance(content, list):
+        problems.add(("processes",), f"processes = {show(content)}: must be tables [[processes]]")
+        return []
+    kinds = {p.name: p for p in PROCESSES}
+    found = []
+    for n, entry in enumerate(content):
+        table = Table(entry, ("processes", n), problems)
+        if "name" not in table:
+            if isinstance(entry, Mapping):
+                table.require("name", did_you_mean("", list(kinds))[2:])
+            continue
+        name = table.choice("name", None, list(kinds))
+        if name is None:
+            continue
+        data = {"name": name}
+        for f in fields(kinds[name]):
+            value = table.take(f.name)
+            if value is None:
+                if f.default is MISSING:
+                    table.require(f.name, 'a number, or a formula in t such as "0.01*(1 - t/400)"')
+            elif isinstance(value, (int, float, str)) and not isinstance(value, bool):
+                data[f.name] = value if isinstance(value, str) else float(value)
+            else:
+                table.bad(f.name, 'must be a number or a formula in t such as "0.01*(1 - t/400)"')
+        table.finish()
+        found.append(data)
+    return found
+
+
+def _initial(table: Table) -> dict[str, Any]:
+    names = ["monodisperse", *_INITIALS]
+    name = table.choice("name", None, names) if "name" in table else "monodisperse"
+    if name is None:
+        return {}
+    table.known.append("name")
+    if name == "monodisperse":
+        data = {"size": table.integer("size", 1, 1, 2**62), "name": name}
+        data["density"] = table.quantity("density", None, units.NUMBER_DENSITY)
+    elif name == Sizes.name:
+        data = {"name": name, "densities": _densities(table)}
+    else:
+        own = {f.name: f.default for f in fields(_INITIALS[name])}
+        data = {"name": name, **_fields(table, "initial", own)}
+    table.finish()
+    return {k: v for k, v in data.items() if v is not None}
+
+
+def _densities(table: Table) -> dict[str, float] | None:
+    value = table.take("densities")
+    if not isinstance(value, Mapping) or not value:
+        table.bad("densities", "must be a table of sizes, such as { 1 = 0.5, 2 = 0.5 }")
+        return None
+    densities: dict[str, float] = {}
+    for size, density in value.items():
+        if not (size.isdecimal() and 1 <= int(size) <= 2**62):
+            path = (*table.path, "densities", size)
+            table.problems.add(path, f"initial size {show(size)}: sizes are whole numbers from 1")
+            continue
+        converted = table.convert(("densities", size), density, units.NUMBER_DENSITY)
+        if converted is not None:
+            densities[str(int(size))] = converted
+    return densities
+
+
+def _require_units(data: Mapping[str, Any], problems: Problems) -> None:
+    """In a case with units nothing may silently be 1 in SI units."""
+    kernel, initial = data.get("kernel", {}), data.get("initial", {})
+    law = next((k for k in KERNELS if k.name == kernel.get("name")), None)
+    if law is not None and "scale" in {f.name for f in fields(law)} and "scale" not in kernel:
+        needed = [
+            [k for k, a in _signature(law, c).items() if a.default is a.empty]
+            for c in getattr(law, "constructors", ())
+        ]
+        instead = "".join(f", or {' and '.join(names)}" for names in needed)
+        problems.add(
+            ("kernel",),
+            f"kernel.scale is missing: the case has units, so the kernel needs "
+            f"{units.KERNEL.words} such as {show(units.KERNEL.example)}{instead}",
+        )
+    if initial.get("name") != Sizes.name and "density" not in initial:
+        problems.add(
+            ("initial",),
+            "initial.density is missing: the case has units, so it needs "
+            f"{units.NUMBER_DENSITY.words} such as {show(units.NUMBER_DENSITY.example)}",
+        )
+
+
+# --- writing -------------------------------------------------------------------------------------
+
+
+def model_tables(model: Model, si: bool) -> dict[str, Any]:
+    """Tables of a case file for a model, with units if it has them."""
+    data = model_to_dict(model)
+    tables: dict[str, Any] = {"kernel": dict(data["kernel"])}
+    if tables["kernel"]["name"] == "formula":
+        del tables["kernel"]["name"]
+    tables["processes"] = [dict(p) for p in data["processes"]]
+    tables["initial"] = _initial_table(model.initial, data["initial"])
+    if si:
+        for (section, key), dimension in FIELDS.items():
+            value = tables[section].get(key)
+            if isinstance(value, Mapping):
+                tables[section][key] = {k: units.text(v, dimension) for k, v in value.items()}
+            elif value is not None and "formula" not in tables[section]:
+                tables[section][key] = units.text(value, dimension)
+    return tables
+
+
+def _initial_table(initial: Initial, data: dict[str, Any]) -> dict[str, Any]:
+    if isinstance(initial, Sizes) and len(initial.sizes) == 1:
+        size, density = initial.sizes[0], initial.densities_[0]
+        return {"name": "monodisperse", "size": size, "density": density}
+    return dict(data)

@@ -1,0 +1,139 @@
+"""Quantities with units, at the edge only: inside, numbers are SI or dimensionless.
+
+A string such as ``"1e12 cm^-3"`` becomes a float in SI units. Pint is loaded when the first string
+comes whose unit is not the SI unit itself, so that cases without units never wait for it.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from .errors import InputError
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """What a quantity measures.
+
+    Attributes
+    ----------
+    words : str
+        Its name in messages.
+    unit : str
+        The SI unit, as text.
+    example : str
+        A quantity as one would write it.
+    """
+
+    words: str
+    unit: str
+    example: str
+
+
+TIME = Dimension("a time", "s", "10 s")
+LENGTH = Dimension("a length", "m", "50 nm")
+VOLUME = Dimension("a volume", "m^3", "1 um^3")
+MASS = Dimension("a mass", "kg", "1 fg")
+NUMBER_DENSITY = Dimension("a number per volume", "m^-3", "1e6 cm^-3")
+MASS_DENSITY = Dimension("a mass per volume", "kg/m^3", "1.2 g/cm^3")
+TEMPERATURE = Dimension("a temperature", "K", "298 K")
+VISCOSITY = Dimension("a dynamic viscosity", "Pa*s", "1.8e-5 Pa s")
+KINEMATIC_VISCOSITY = Dimension("a kinematic viscosity", "m^2/s", "1.5e-5 m^2/s")
+RATE = Dimension("a rate (one over a time)", "1/s", "100 1/s")
+ACCELERATION = Dimension("an acceleration", "m/s^2", "9.81 m/s^2")
+DISSIPATION = Dimension("an energy dissipation rate per mass", "m^2/s^3", "0.01 m^2/s^3")
+KERNEL = Dimension("a collision kernel (volume per time)", "m^3/s", "1e-9 cm^3/s")
+NONE = Dimension("a plain number", "", "0.5")
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+
+
+def parse(text: str, dimension: Dimension) -> float:
+    """Turn a quantity with a unit into SI.
+
+    Parameters
+    ----------
+    text : str
+        A number and a unit, such as ``"1e12 cm^-3"``.
+    dimension : Dimension
+        What it should measure.
+
+    Returns
+    -------
+    float
+        In units of ``dimension.unit``.
+
+    Raises
+    ------
+    InputError
+        No number, no unit, an unknown unit or one of another dimension.
+    """
+    match = _QUANTITY.fullmatch(text)
+    wanted = f'{dimension.words}, for example "{dimension.example}"'
+    if match is None:
+        raise InputError(f"is not a number with a unit; give {wanted}")
+    number, unit = float(match[1]), match[2]
+    if not math.isfinite(number):
+        raise InputError(f"is not finite; give {wanted}")
+    if not unit:
+        raise InputError(f"has no unit; give {wanted}, or a plain number without quotes")
+    if unit == dimension.unit:
+        # the unit that `text` writes: no conversion, so that a resolved case reads back bit for bit
+        return number
+    return _convert(number, unit, dimension, wanted)
+
+
+def parse_any(text: str) -> float:
+    """Turn a quantity of any dimension into SI base units.
+
+    Raises
+    ------
+    InputError
+        No number, no unit or an unknown one.
+    """
+    match = _QUANTITY.fullmatch(text)
+    if match is None or not match[2]:
+        raise InputError('must be a number, or a number with its unit such as "298 K"')
+    try:
+        return _tidy(_registry().Quantity(float(match[1]), match[2]).to_base_units().magnitude)
+    except Exception:  # pint raises half a dozen kinds, some of Python's own
+        raise InputError(f'has an unknown unit ("{match[2]}")') from None
+
+
+def text(value: float, dimension: Dimension) -> str:
+    """Write an SI value so that `parse` gives it back exactly."""
+    return f"{value!r} {dimension.unit}"
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    # offset units (degC) mean a temperature here, never a difference of two
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True, cache_folder=":auto:")
+
+
+def _tidy(value: float) -> float:
+    """Drop the last digit, in which conversions leave their rounding: 1e12 cm^-3 is 1e18 m^-3."""
+    return float(f"{value:.15g}")
+
+
+def _convert(number: float, unit: str, dimension: Dimension, wanted: str) -> float:
+    registry = _registry()
+    try:
+        quantity = registry.Quantity(number, unit)
+        value = _tidy(quantity.to(dimension.unit or "dimensionless").magnitude)
+    except Exception as problem:  # pint raises half a dozen kinds, some of Python's own
+        kind = type(problem).__name__
+        if kind == "DimensionalityError":
+            raise InputError(f"has the unit of something else; give {wanted}") from None
+        if kind == "UndefinedUnitError":
+            raise InputError(f'has an unknown unit ("{unit}"); give {wanted}') from None
+        raise InputError(f'has a unit that cannot be read ("{unit}"); give {wanted}') from None
+    if not math.isfinite(value):
+        raise InputError(f"is not finite in SI units; give {wanted}")
+    return value
