@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from typing import Any, TypeVar
@@ -11,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from . import kernels
+from .callables import Function
 from .errors import InputError, did_you_mean
 from .initial import INITIALS, Initial, Sizes, from_sizes, monodisperse
 from .kernels.base import Kernel
@@ -25,38 +24,33 @@ T = TypeVar("T")
 FUNCTION = "function"
 
 
-def _source(function: Callable[..., Any]) -> dict[str, str]:
-    """Return the text of a function, or only its name in a session that keeps no text."""
-    name = getattr(function, "__qualname__", repr(function))
-    try:
-        return {FUNCTION: name, "source": textwrap.dedent(inspect.getsource(function))}
-    except (OSError, TypeError):
-        return {FUNCTION: name}
+def _function(user: Function) -> dict[str, Any]:
+    """Return the name and the text of a function, the values of its parameters being defaults."""
+    return {FUNCTION: user.text, "source": user.source}
 
 
 def _plain(value: Any) -> Any:
-    """Return plain Python numbers, texts, lists and dictionaries."""
-    if isinstance(value, TimeFunction):
-        if value.constant is not None:
-            return float(value.constant)
-        return value.text if value.rigorous else _source(value.rate)
+    """Return plain Python numbers and texts; of a function, its text."""
     if isinstance(value, np.generic):
         return value.item()
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
-    return _source(value) if callable(value) else value
+    if isinstance(value, (str, int, float)) or value is None:
+        return value
+    rate = TimeFunction.of(value)
+    if rate.user is not None:
+        return _function(rate.user)
+    return rate.text if rate.constant is None else rate.constant
 
 
-def _fields(thing: Kernel | PairProcess | Initial) -> dict[str, Any]:
+def _fields(thing: PairProcess | Initial) -> dict[str, Any]:
     return {f.name: _plain(getattr(thing, f.name)) for f in fields(thing)}
 
 
 def _kernel_to_dict(kernel: Kernel) -> dict[str, Any]:
-    if type(kernel) in kernels.KERNELS:
-        return {"name": kernel.name, **_fields(kernel)}
-    return {"name": kernel.name, **_source(getattr(kernel, "function", type(kernel)))}
+    try:
+        return kernel.to_dict()
+    except InputError:
+        # a Python function has no such form; what is known of it is kept for the reader
+        return kernel.describe()
 
 
 def _initial_to_dict(initial: Initial) -> dict[str, Any]:
@@ -138,22 +132,13 @@ class _Reader:
 
     def kernel(self, given: Any) -> Kernel | None:
         """Rebuild a law or a formula."""
-        laws = {k.name: k for k in kernels.KERNELS}
         if isinstance(given, Mapping) and FUNCTION in given:
             self.problems.append(
                 f"kernel: is the Python function {given[FUNCTION]!r}, which no file can bring "
                 "back; wrap it again with smolux.kernels.from_function"
             )
             return None
-        name, rest = self.table("kernel", given, [*laws, "formula"])
-        if name == "formula":
-            text = rest.pop("formula", None)
-            if not isinstance(text, str):
-                hint = 'must be a text such as "(i + j)/2"'
-                self.problems.append(f"kernel: formula = {text!r}: {hint}")
-                return None
-            return self.attempt("kernel", kernels.formula, text, **rest)
-        return self.build(f"kernel {name!r}", laws[name], rest) if name else None
+        return self.attempt("kernel", kernels.from_dict, given)
 
     def process(self, given: Any) -> PairProcess | None:
         """Rebuild a process."""

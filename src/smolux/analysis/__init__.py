@@ -1,0 +1,27 @@
+"""What results say: means and intervals, agreement, oscillations, gelation, scaling."""
+
+from .compare import compare
+from .gelation import gel_fraction, gelation
+from .moments import moments
+from .oscillations import extrema, oscillations
+from .reference import exact_dataset, model_of
+from .scaling import mean_size, scaling
+from .select import series
+from .summary import summary
+from .table import format_table
+
+__all__ = [
+    "compare",
+    "exact_dataset",
+    "extrema",
+    "format_table",
+    "gel_fraction",
+    "gelation",
+    "mean_size",
+    "model_of",
+    "moments",
+    "oscillations",
+    "scaling",
+    "series",
+    "summary",
+]

@@ -1,0 +1,53 @@
+"""One time series out of a result."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from smolux.errors import InputError, did_you_mean
+
+#: variables of (replica, time) and what the two with a further dimension are chosen by
+_FURTHER = {"moment": "order", "n": "size", "n_bin": "bin", "events": "process"}
+
+
+def series(
+    ds: xr.Dataset, variable: str, *, order: float = 2.0, size: int = 1, **labels: object
+) -> xr.DataArray:
+    """Return one quantity over replica and time.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+    variable : str
+        Name of a variable of the result.
+    order : float
+        Which moment, if `variable` is ``moment``.
+    size : int
+        Which size, if it is ``n``.
+    **labels
+        Likewise ``process`` for ``events``; ``bin`` for ``n_bin``.
+
+    Returns
+    -------
+    xarray.DataArray of shape (replica, time)
+
+    Raises
+    ------
+    InputError
+        If there is no such variable, order, size or process.
+    """
+    known = [str(name) for name, v in ds.data_vars.items() if "time" in v.dims]
+    if variable not in known:
+        raise InputError(
+            f"variable = {variable!r}: not in the result{did_you_mean(variable, known)}"
+        )
+    dim = _FURTHER.get(variable)
+    values = ds[variable]
+    if dim is not None:
+        wanted = {"order": order, "size": size, **labels}.get(dim)
+        present = ds[dim].values.tolist()
+        if wanted not in present:
+            shown = present if len(present) <= 12 else f"{present[0]} to {present[-1]}"
+            raise InputError(f"{dim} = {wanted!r}: not in the result, which has {shown}")
+        values = values.sel({dim: wanted}, drop=True)
+    return values.transpose("replica", "time")

@@ -1,0 +1,144 @@
+"""Means, 95 % intervals and deviations from the exact solution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from smolux.errors import InputError
+
+from .reference import exact_dataset, is_deterministic
+from .statistics import deviation, over_replicas, quantile
+
+Float = NDArray[np.float64]
+
+#: the labels of the dimension `statistic`
+STATISTICS = ("mean", "standard_error", "lower", "upper", "exact", "sigmas", "replicas")
+
+_MEANINGS = {
+    "mean": "mean over the replicas that reached the time",
+    "standard_error": "standard error of the mean; NaN for a single replica",
+    "lower, upper": "95 % interval of the mean by Student's t over the replicas",
+    "exact": "exact solution in the limit of infinitely many particles, NaN where none is known",
+    "sigmas": "(mean - exact) / standard_error, turned from Student's t into the normal deviate of "
+    "the same probability; NaN where the replicas show no spread",
+    "replicas": "number of replicas in the mean",
+}
+
+_BIAS = (
+    "The interval is the scatter of the replicas. The bias of a finite population, of order 1/N "
+    "for N simulated particles, is not in it and does not fall with the number of replicas."
+)
+
+
+def mass_resolution(ds: xr.Dataset) -> float:
+    """Share of the mass that one particle makes up at the start; 0 if unknown."""
+    if is_deterministic(ds) or 1.0 not in ds["order"].values:
+        return 0.0
+    start = ds.isel(time=0)
+    mass = (start["moment"].sel(order=1.0) * start["volume"]).values
+    with np.errstate(all="ignore"):
+        share = start["largest"].values / mass
+    return float(np.nanmax(share)) if np.any(np.isfinite(share)) else 0.0
+
+
+def certain_difference(name: str, orders: Float, dims: Sequence[str], resolution: float) -> Float:
+    """Relative difference that no chance explains even without spread: of the mass only."""
+    if name != "moment":
+        return np.array(np.inf)
+    allowed = np.where(orders == 1, max(1e-6, 2 * resolution), np.inf)
+    return allowed.reshape([-1 if d == "order" else 1 for d in dims])
+
+
+def _of_variable(ds: xr.Dataset, exact: xr.Dataset | None, name: str) -> xr.DataArray:
+    variable = ds[name].transpose("replica", ...)
+    dims = [str(d) for d in variable.dims[1:]]
+    count, mean, error = over_replicas(variable.values)
+    if name == "n":
+        # zero in every replica is no proof that there are none
+        error = np.where(mean == 0, np.nan, error)
+    half = quantile(count) * error
+    known = np.full(mean.shape, np.nan)
+    if exact is not None:
+        known = exact[name].transpose(*dims).values
+    # moments beyond gelation are infinite: there is nothing to compare
+    finite = np.where(np.isfinite(known), known, np.nan)
+    magnitude = np.fmax(np.abs(mean), np.abs(finite))
+    certain = certain_difference(name, ds["order"].values, dims, mass_resolution(ds))
+    sigmas = deviation(mean - finite, error, count - 1, magnitude, certain)
+    values = np.stack([mean, error, mean - half, mean + half, known, sigmas, count], axis=-1)
+    coordinates = {d: ds[d] for d in dims} | {"statistic": list(STATISTICS)}
+    return xr.DataArray(values, coordinates, [*dims, "statistic"], attrs=dict(ds[name].attrs))
+
+
+def _notes(ds: xr.Dataset, result: xr.Dataset, exact: xr.Dataset | None) -> list[str]:
+    count = result["number_density"].sel(statistic="replicas").values
+    replicas = ds.sizes["replica"]
+    notes = []
+    if is_deterministic(ds):
+        notes.append("Deterministic: there is no scatter and no interval.")
+    else:
+        notes.append(_BIAS)
+        if replicas == 1:
+            notes.append("One replica tells nothing of its scatter: no interval; use 8 or more.")
+    if np.any(count < replicas):
+        since = ds["time"].values[np.argmax(count < replicas)]
+        notes.append(
+            f"The run was not finished: from t = {since:g} on, fewer than {replicas} replicas are "
+            "in the mean."
+        )
+    extinct = int(np.isfinite(ds["extinction_time"].values).sum()) if "extinction_time" in ds else 0
+    if extinct:
+        notes.append(
+            f"In {extinct} of {replicas} replicas everything became one cluster; they stay in the "
+            "means."
+        )
+    if exact is None:
+        notes.append("No exact solution is known for this model.")
+    return notes
+
+
+def summary(ds: xr.Dataset, sizes: Sequence[int] = (1, 2, 5, 10, 20, 50, 100)) -> xr.Dataset:
+    """Mean and 95 % interval over replicas, beside the exact solution where one is known.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        A result of `smolux.simulate` or `smolux.solve`.
+    sizes : sequence of int
+        The sizes whose number densities are wanted; those beyond the result are left out.
+
+    Returns
+    -------
+    xarray.Dataset
+        The variables number_density, moment and n with a dimension ``statistic``, whose labels are
+        mean, standard_error, lower, upper, exact, sigmas and replicas; the attributes say what they
+        mean, and ``notes`` what should be known of this result. `format_table` makes text of it.
+
+    Raises
+    ------
+    InputError
+        If `ds` is no result.
+
+    Examples
+    --------
+    >>> smolux.summary(ds)["moment"].sel(order=2, statistic="mean")  # doctest: +SKIP
+    """
+    missing = [name for name in ("number_density", "moment", "n") if name not in ds]
+    if missing or "replica" not in ds.dims:
+        raise InputError(
+            f"ds: is no result of simulate or solve, it has no {', '.join(missing) or 'replica'}"
+        )
+    ds = ds.sel(size=[s for s in sizes if s in ds["size"].values])
+    exact = exact_dataset(ds)
+    result = xr.Dataset(
+        {name: _of_variable(ds, exact, name) for name in ("number_density", "moment", "n")}
+    )
+    kept = ("Conventions", "source", "smolux_schema", "model", "method", "seed", "created")
+    result.attrs = {key: ds.attrs[key] for key in kept if key in ds.attrs}
+    result.attrs["statistics"] = "; ".join(f"{k}: {v}" for k, v in _MEANINGS.items())
+    result.attrs["notes"] = " ".join(_notes(ds, result, exact))
+    return result

@@ -1,0 +1,101 @@
+"""A summary as text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import floor, isfinite, log10, nan
+
+import numpy as np
+import xarray as xr
+
+from smolux.errors import InputError, did_you_mean
+
+#: with replicas, and without any scatter
+_HEADER = ("time", "mean", "95 %", "exact", "sigmas")
+_BARE = ("time", "value", "exact", "relative difference")
+
+
+def _number(value: float, digits: int) -> str:
+    return f"{value:.{digits}g}" if isfinite(value) else "-" if value != value else f"{value:g}"
+
+
+def _pair(mean: float, half: float) -> tuple[str, str]:
+    """Write a mean to the second digit of its interval."""
+    if not (isfinite(mean) and isfinite(half) and half > 0 and mean != 0):
+        return _number(mean, 6), _number(half, 2)
+    if half > abs(mean):
+        return _number(mean, 2), f"±{half:.2g}"
+    digits = floor(log10(abs(mean))) - floor(log10(half)) + 2
+    return _number(mean, min(max(digits, 2), 12)), f"±{half:.2g}"
+
+
+def _rows(variable: xr.DataArray) -> list[tuple[str, ...]]:
+    """Header and rows of one table."""
+    column = {str(k): variable.sel(statistic=k).values for k in variable["statistic"].values}
+    scatter = bool(np.any(np.isfinite(column["standard_error"])))
+    rows: list[tuple[str, ...]] = [_HEADER if scatter else _BARE]
+    for t, time in enumerate(variable["time"].values):
+        mean, exact = float(column["mean"][t]), float(column["exact"][t])
+        first, last = _number(float(time), 6), _number(exact, 6)
+        if scatter:
+            half = float(column["upper"][t]) - mean
+            sigmas = _number(float(column["sigmas"][t]), 2)
+            rows.append((first, *_pair(mean, half), last, sigmas))
+        else:
+            relative = (mean - exact) / abs(exact) if exact else nan
+            rows.append((first, _number(mean, 6), last, _number(relative, 2)))
+    return rows
+
+
+def _sections(summary: xr.Dataset, names: Sequence[str]) -> Iterator[tuple[str, xr.DataArray]]:
+    for name in names:
+        variable = summary[name]
+        title = str(variable.attrs.get("long_name", name))
+        others = [str(d) for d in variable.dims if d not in ("time", "statistic")]
+        if not others:
+            yield title, variable
+            continue
+        for label in variable[others[0]].values:
+            if others[0] == "order" and label == 0 and "number_density" in names:
+                continue
+            what = f"moment M{label:g}" if others[0] == "order" else f"density of size {label:g}"
+            yield what, variable.sel({others[0]: label})
+
+
+def format_table(summary: xr.Dataset, variables: Sequence[str] | None = None) -> str:
+    """Write a summary as tables for the terminal: time, mean, 95 % half width, exact, sigmas.
+
+    Parameters
+    ----------
+    summary : xarray.Dataset
+        Made by `smolux.summary`.
+    variables : sequence of str, optional
+        Which of number_density, moment and n; all if left out.
+
+    Returns
+    -------
+    str
+        A dash stands for what is not known. Without any scatter (a solver, a single replica) the
+        columns are time, value, exact and relative difference.
+
+    Raises
+    ------
+    InputError
+        If there is no such variable.
+    """
+    if "statistic" not in summary.dims:
+        raise InputError("summary: make it with smolux.summary(ds) first")
+    known = [str(name) for name in summary.data_vars]
+    unknown = [name for name in variables or () if name not in known]
+    if unknown:
+        raise InputError([f"variables: no {name!r}{did_you_mean(name, known)}" for name in unknown])
+    lines: list[str] = []
+    for title, variable in _sections(summary, variables or known):
+        rows = _rows(variable)
+        width = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines += [
+            title,
+            *("  ".join(c.rjust(w) for c, w in zip(r, width, strict=True)) for r in rows),
+            "",
+        ]
+    return "\n".join([*lines, summary.attrs.get("notes", "")]).rstrip() + "\n"
