@@ -14,15 +14,25 @@ __version__ = "0.1.0"
 #: public name -> module that defines it; a module stands for itself
 _LAZY = {
     "Model": "smolux.model",
-    "simulate": "smolux.simulate",
-    "resume": "smolux.simulate",
+    "simulate": "smolux.stochastic",
+    "resume": "smolux.stochastic",
     "solve": "smolux.deterministic",
     "summary": "smolux.analysis",
     "InputError": "smolux.errors",
     "Interrupted": "smolux.errors",
     "SmoluxWarning": "smolux.errors",
     **dict.fromkeys(
-        ("analysis", "exact", "initial", "kernels", "methods", "plotting", "processes", "results", "weighting")
+        (
+            "analysis",
+            "exact",
+            "initial",
+            "kernels",
+            "methods",
+            "plotting",
+            "processes",
+            "results",
+            "weighting",
+        )
     ),
     "plot": "smolux.plotting",
 }
@@ -47,7 +57,7 @@ if TYPE_CHECKING:
     from .deterministic import solve
     from .errors import InputError, Interrupted, SmoluxWarning
     from .model import Model
-    from .simulate import resume, simulate
+    from .stochastic import resume, simulate
 
 
 def __getattr__(name: str) -> Any:

@@ -26,6 +26,11 @@ _TAIL = 2.0**-53
 _BELOW_ONE = 1.0 - _TAIL
 
 
+#: distributions up to this size are sampled size by size, others particle by particle in batches
+_TABULATED = 1 << 20
+_BATCH = 1 << 22
+
+
 @dataclass(frozen=True)
 class Initial:
     """A size distribution at time zero: `density` particles per unit volume in all."""
@@ -70,17 +75,21 @@ class Initial:
         sizes, counts : ndarray of int64
             The sizes present, ascending, and how many particles have each.
         """
-        sizes, counts = [], []
-        step = 1 << 22  # bounds the memory of one batch
-        for start in range(0, particles, step):
-            index = np.arange(start, min(start + step, particles))
-            # the last share may round up to one, where a distribution without an end has no size
-            share = np.minimum((index + u) / particles, _BELOW_ONE)
-            s, c = np.unique(self.quantile(share), return_counts=True)
-            sizes.append(s)
-            counts.append(c)
-        size, inverse = np.unique(np.concatenate(sizes), return_inverse=True)
-        return size, np.bincount(inverse, np.concatenate(counts)).astype(np.int64)
+        if self.largest <= _TABULATED:
+            shares = self.cumulative(np.arange(self.largest + 1, dtype=float))
+            shares[-1] = 1.0
+            before = np.clip(np.ceil(shares * particles - u), 0, particles).astype(np.int64)
+            counts = np.diff(before)
+            return np.flatnonzero(counts) + 1, counts[counts > 0]
+        drawn = [
+            np.unique(
+                self.quantile((np.arange(a, min(a + _BATCH, particles)) + u) / particles),
+                return_counts=True,
+            )
+            for a in range(0, particles, _BATCH)
+        ]
+        size, inverse = np.unique(np.concatenate([s for s, _ in drawn]), return_inverse=True)
+        return size, np.bincount(inverse, np.concatenate([c for _, c in drawn])).astype(np.int64)
 
 
 def _positive(problems: list[str], **values: float) -> None:
@@ -256,7 +265,9 @@ def from_sizes(densities: Mapping[int, float]) -> Sizes:
         Size to particles per unit volume.
     """
     items = sorted(densities.items())
-    return Sizes(tuple(int(s) if s == int(s) else s for s, _ in items), tuple(float(d) for _, d in items))
+    return Sizes(
+        tuple(int(s) if s == int(s) else s for s, _ in items), tuple(float(d) for _, d in items)
+    )
 
 
 def exponential(mean: float, density: float = 1.0) -> Exponential:

@@ -1,0 +1,153 @@
+"""Checkpoints: the plan and every array of the state, in one file, without pickle."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .core.state import State, Tally, Windows
+from .errors import InputError, did_you_mean
+from .files import replacing
+from .methods import METHODS
+from .model import Model
+from .model_dict import model_from_dict, model_to_dict
+from .replicas import Group, Plan
+from .weighting import WEIGHTINGS
+
+#: raised whenever the content of a checkpoint changes
+VERSION = 1
+
+
+def _plan_to_dict(plan: Plan) -> dict[str, Any]:
+    return {
+        "model": model_to_dict(plan.model),
+        "times": list(plan.times),
+        "method": {"name": plan.method.name, **asdict(plan.method)},  # type: ignore[call-overload]
+        "weighting": {"name": plan.weighting.name, **asdict(plan.weighting)},  # type: ignore[call-overload]
+        "population": plan.population,
+        "particles": plan.particles,
+        "replicas": plan.replicas,
+        "entropy": str(plan.entropy),
+        "orders": list(plan.orders),
+        "sizes": plan.sizes,
+        "bins_per_octave": plan.bins_per_octave,
+        "distribution": plan.distribution,
+    }
+
+
+def named(given: dict[str, Any], registry: Sequence[Any], what: str) -> Any:
+    """Make a method or weighting from its name and settings."""
+    settings = dict(given)
+    name = settings.pop("name")
+    found = {entry.name: entry for entry in registry}
+    if name not in found:
+        raise InputError(f"{what} = {name!r}: unknown{did_you_mean(str(name), list(found))}")
+    return found[name](**settings)
+
+
+def _plan_from_dict(given: dict[str, Any], model: Model | None) -> Plan:
+    values = dict(given)
+    stored = values.pop("model")
+    return Plan(
+        model=model if model is not None else model_from_dict(stored),
+        times=tuple(values.pop("times")),
+        method=named(values.pop("method"), METHODS, "method"),
+        weighting=named(values.pop("weighting"), WEIGHTINGS, "weighting"),
+        entropy=int(values.pop("entropy")),
+        orders=tuple(values.pop("orders")),
+        **values,
+    )
+
+
+def save(path: str | Path, plan: Plan, groups: Sequence[Group]) -> None:
+    """Write a checkpoint, whole or not at all; see `smolux.files.replacing`."""
+    arrays: dict[str, np.ndarray] = {}
+    about = []
+    for k, group in enumerate(groups):
+        for kind, values in (("state", group.state), ("work", group.work), ("tally", group.tally)):
+            arrays |= {f"{k}/{kind}/{name}": v for name, v in values._asdict().items()}
+        arrays[f"{k}/codes"] = group.codes
+        arrays |= {f"{k}/windows/{name}": v for name, v in group.windows._asdict().items()}
+        rows = [row for replica in group.distribution for row in replica]
+        empty = [np.empty(0, np.int64)]
+        arrays[f"{k}/distribution/rows"] = np.array([len(s) for s, _ in rows], np.int64)
+        arrays[f"{k}/distribution/sizes"] = np.concatenate([s for s, _ in rows] + empty)
+        arrays[f"{k}/distribution/counts"] = np.concatenate([c for _, c in rows] + empty)
+        about.append(
+            {
+                "first": group.first,
+                "warnings": group.warnings,
+                "seconds": group.seconds,
+                "populations": [len(replica) for replica in group.distribution],
+            }
+        )
+    meta = {"version": VERSION, "plan": _plan_to_dict(plan), "groups": about}
+    arrays["meta"] = np.frombuffer(json.dumps(meta).encode(), np.uint8)
+    with replacing(path) as temporary, temporary.open("wb") as f:
+        np.savez(f, **arrays)  # type: ignore[arg-type]
+
+
+def load(path: str | Path, model: Model | None = None) -> tuple[Plan, list[Group]]:
+    """Read a checkpoint.
+
+    Parameters
+    ----------
+    path : str or path
+    model : Model, optional
+        Needed if the kernel or a rate is a Python function, which a file cannot hold; it must be the
+        model of the interrupted run.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, of another version, or of another model.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        meta = json.loads(arrays.pop("meta").tobytes())
+    except FileNotFoundError:
+        raise InputError(f"checkpoint = {str(path)!r}: there is no such file") from None
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise InputError(f"checkpoint = {str(path)!r}: cannot be read ({error})") from error
+    if meta["version"] != VERSION:
+        raise InputError(
+            f"checkpoint = {str(path)!r}: has version {meta['version']}, this smolux reads {VERSION}; "
+            "go on with the smolux that wrote it"
+        )
+    if model is not None and model_to_dict(model) != meta["plan"]["model"]:
+        raise InputError(f"model: is not the one of the checkpoint {str(path)!r}")
+    plan = _plan_from_dict(meta["plan"], model)
+    return plan, [_group(plan, k, about, arrays) for k, about in enumerate(meta["groups"])]
+
+
+def _group(plan: Plan, k: int, about: dict[str, Any], arrays: dict[str, np.ndarray]) -> Group:
+    def part(kind: str) -> dict[str, np.ndarray]:
+        start = f"{k}/{kind}/"
+        return {n.removeprefix(start): v for n, v in arrays.items() if n.startswith(start)}
+
+    stored = part("distribution")
+    ends = np.cumsum(stored["rows"])[:-1]
+    rows = list(zip(np.split(stored["sizes"], ends), np.split(stored["counts"], ends), strict=True))
+    distribution = []
+    for length in about["populations"]:
+        distribution.append(rows[:length])
+        rows = rows[length:]
+    return Group(
+        plan,
+        about["first"],
+        State(**part("state")),
+        plan.method.work_type(**part("work")),
+        Tally(**part("tally")),
+        arrays[f"{k}/codes"],
+        Windows(**part("windows")),
+        warnings=list(about["warnings"]),
+        distribution=distribution,
+        seconds=about["seconds"],
+    )

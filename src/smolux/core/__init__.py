@@ -1,0 +1,1 @@
+"""The compiled part: event loop, random numbers, stores. Imports only NumPy and Numba."""

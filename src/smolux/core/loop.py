@@ -1,0 +1,307 @@
+"""The one event loop.
+
+A method brings seven `Pieces`, a model two; they are bound by closure and inlined. A piece that needs
+another one, or the rate, is made by a function that takes it: a compiled function passed as an argument
+could not be kept in the cache.
+
+The loop returns when every output time is recorded, when its budget is spent, or when it needs Python:
+a larger store, a bound of the kernel. The pending event is part of the state, so a trajectory
+depends neither on the output times nor on where the loop returned.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from . import rng
+from .compile import cold_piece, entry, piece
+from .state import (
+    BAD_FACTOR,
+    BUDGET,
+    DONE,
+    DOUBLE_AT,
+    DOUBLINGS,
+    DRAW,
+    EVENTS,
+    EXTINCT,
+    FIRE,
+    FIRST,
+    FLOOR,
+    GROW,
+    LARGEST,
+    NEXT,
+    PARTICLES,
+    PAUSE,
+    PAUSED,
+    PENDING,
+    PHASE,
+    PROCESS,
+    REPAIRS,
+    SINCE,
+    TIME,
+    TRIALS,
+    VALUE,
+    VOLUME,
+    WINDOW,
+    State,
+    Tally,
+)
+
+_ROUNDING = 1.0 + 1e-12
+
+
+@piece
+def choose_process(s, windows, factor, q):
+    """Choose the process of the pending event, or none: thinning by the true factor at its time."""
+    window = s.count[WINDOW]
+    if windows.bounds.shape[1] == 1 and windows.edges[window + 1] == math.inf:
+        return 0
+    x = rng.uniform(s.rng) * windows.total[window]
+    r = 0
+    while r < windows.bounds.shape[1] - 1 and x >= windows.bounds[window, r]:
+        x -= windows.bounds[window, r]
+        r += 1
+    value = factor(r, s.clock[PENDING], q)
+    bound = windows.bounds[window, r]
+    if not 0.0 <= value <= bound * _ROUNDING:
+        s.clock[VALUE] = value
+        s.count[PROCESS] = r
+        return -2 if not 0.0 <= value < math.inf else -3
+    # x is uniform below the bound, and serves again
+    return r if x < value else -1
+
+
+class Pieces(NamedTuple):
+    """What a method brings; `s` is the state and `w` the work arrays of one replica.
+
+    Attributes
+    ----------
+    view : ``view(work, r)``
+        The work arrays of replica `r`.
+    draw : ``draw(s, w, p, factor)``
+        Choose the next pair into ``count[FIRST]``, ``count[SECOND]`` (-1: nothing happens then) and return the
+        waiting time, the rate being `factor` times that of the kernel.
+    pair : ``pair(s, w)``
+        Sizes of the chosen pair.
+    update : ``update(s, w, entries, p)``
+        Take the pair out and put the `entries` of ``s.sizes``, ``s.counts`` in; False, with nothing changed, if
+        there is no room.
+    prepare : ``prepare(s, w, p)``
+        Bring bounds up to date; 0 or the reason to return.
+    double : ``double(s, w)``
+        Put every particle in once more; False, with nothing changed, if there is no room.
+    visit : ``visit(s, w, t, grid)``
+        Call `tally_one` for the particles present and return the largest size.
+    """
+
+    view: Any
+    draw: Any
+    pair: Any
+    update: Any
+    prepare: Any
+    double: Any
+    visit: Any
+
+
+def make_next_event(draw: Callable[..., Any]) -> Callable[..., Any]:
+    """Bind the drawing of the next event: population policy, bounds, waiting time, window."""
+
+    @piece
+    def next_event(s, w, windows, p):
+        window = s.count[WINDOW]
+        total = windows.total[window]
+        wait = math.inf
+        if total > 0.0:
+            wait = draw(s, w, p, total)
+        pending = s.clock[TIME] + wait
+        if pending >= windows.edges[window + 1] and windows.edges[window + 1] < math.inf:
+            # the exponential law has no memory: go on afresh from the edge
+            s.clock[TIME] = windows.edges[window + 1]
+            s.count[WINDOW] = window + 1
+            return False
+        s.clock[PENDING] = pending
+        s.count[PROCESS] = -1
+        s.count[PHASE] = FIRE
+        return True
+
+    return next_event
+
+
+def make_fire(
+    pair: Callable[..., Any],
+    update: Callable[..., Any],
+    outcome: Callable[..., Any],
+    factor: Callable[..., Any],
+) -> Callable[..., Any]:
+    """Bind what happens when the pending event comes: 0 or the reason to return."""
+
+    @piece
+    def fire(s, w, windows, p, q):
+        if s.count[FIRST] >= 0:
+            r = s.count[PROCESS]
+            if r < 0:
+                r = choose_process(s, windows, factor, q)
+                if r <= -2:
+                    return BAD_FACTOR
+                s.count[PROCESS] = r
+            if r >= 0:
+                i, j = pair(s, w)
+                entries = outcome(r, i, j, s.sizes, s.counts)
+                if not update(s, w, entries, p):
+                    return GROW
+                s.count[EVENTS] += 1
+                s.count[SINCE] += 1
+                s.events[r] += 1
+                if s.count[PARTICLES] == 1:
+                    s.clock[EXTINCT] = s.clock[PENDING]
+        s.clock[TIME] = s.clock[PENDING]
+        s.count[PHASE] = DRAW
+        return 0
+
+    return fire
+
+
+@cold_piece
+def tally_one(t, grid, size, count):
+    """Add `count` particles of one size to an observation."""
+    if size < t.counts.shape[0]:
+        t.counts[size] += count
+        return
+    low, high = 0, grid.edges.shape[0]  # last edge at or below the size
+    while high - low > 1:
+        middle = (low + high) // 2
+        if grid.edges[middle] <= size:
+            low = middle
+        else:
+            high = middle
+    t.bins[low] += count
+    x = float(size)
+    for o in range(grid.orders.shape[0]):
+        t.sums[o] += count * x ** grid.orders[o]
+
+
+def make_record(visit: Callable[..., Any]) -> Callable[..., Any]:
+    """Bind the recording of an observation."""
+
+    @cold_piece
+    def record(s, w, t, grid, time):
+        t.scalars[0] = time
+        t.scalars[1] = s.count[PARTICLES]
+        t.scalars[2] = s.count[EVENTS]
+        t.scalars[3] = s.clock[VOLUME]
+        t.scalars[4] = visit(s, w, t, grid)
+        for r in range(s.events.shape[0]):
+            t.events[r] = s.events[r]
+
+    return record
+
+
+def make_loop(
+    pieces: Pieces, outcome: Callable[..., Any], factor: Callable[..., Any]
+) -> Callable[..., Any]:
+    """Assemble and compile the loop.
+
+    Parameters
+    ----------
+    pieces : Pieces
+        Of the method.
+    outcome : callable
+        ``outcome(r, i, j, sizes, counts)``: what process `r` makes of the sizes `i` and `j`.
+    factor : callable
+        ``factor(r, t, q)``: its rate as a multiple of the kernel.
+
+    Returns
+    -------
+    callable
+        ``loop(state, work, tally, windows, grid, p, q, codes, budget)`` advances every replica whose
+        code is not `DONE` and writes why it returned into `codes`.
+    """
+    view, prepare, double = pieces.view, pieces.prepare, pieces.double
+    next_event = make_next_event(pieces.draw)
+    fire = make_fire(pieces.pair, pieces.update, outcome, factor)
+    record = make_record(pieces.visit)
+
+    @cold_piece
+    def advance(s, w, tally, windows, grid, p, q, budget):
+        stop = s.count[TRIALS] + s.count[EVENTS] + budget
+        while True:
+            if s.count[PHASE] == DRAW:
+                while s.count[PARTICLES] <= s.count[DOUBLE_AT]:
+                    if not double(s, w):
+                        return GROW
+                    s.clock[VOLUME] *= 2.0
+                    s.count[DOUBLINGS] += 1
+                    s.clock[EXTINCT] = math.nan
+                reason = prepare(s, w, p)
+                if reason != 0:
+                    return reason
+                if s.count[TRIALS] + s.count[EVENTS] >= stop:
+                    return BUDGET
+                if not next_event(s, w, windows, p):
+                    continue
+            while (
+                s.count[NEXT] < grid.times.shape[0] and grid.times[s.count[NEXT]] < s.clock[PENDING]
+            ):
+                k = s.count[NEXT]
+                record(
+                    s,
+                    w,
+                    Tally(
+                        tally.scalars[k],
+                        tally.events[k],
+                        tally.counts[k],
+                        tally.bins[k],
+                        tally.sums[k],
+                    ),
+                    grid,
+                    grid.times[k],
+                )
+                s.count[NEXT] += 1
+                if s.count[PAUSE] == 1:
+                    return PAUSED
+            if s.count[NEXT] >= grid.times.shape[0]:
+                return DONE
+            reason = fire(s, w, windows, p, q)
+            if reason != 0:
+                return reason
+
+    def loop(state, work, tally, windows, grid, p, q, codes, budget):
+        for r in range(codes.shape[0]):
+            if codes[r] == DONE:
+                continue
+            if budget <= 0:
+                codes[r] = BUDGET
+                continue
+            s = State(
+                state.rng[r],
+                state.clock[r],
+                state.count[r],
+                state.events[r],
+                state.sizes[r],
+                state.counts[r],
+            )
+            t = Tally(
+                tally.scalars[r], tally.events[r], tally.counts[r], tally.bins[r], tally.sums[r]
+            )
+            before = s.count[TRIALS] + s.count[EVENTS]
+            codes[r] = advance(s, view(work, r), t, windows, grid, p, q, budget)
+            budget -= s.count[TRIALS] + s.count[EVENTS] - before
+
+    return entry(loop)
+
+
+@piece
+def repair(s, value):
+    """Note a rate above its bound and raise the bound for the rest of the run."""
+    s.count[REPAIRS] += 1
+    s.clock[VALUE] = value
+    s.clock[FLOOR] = max(s.clock[FLOOR], 1.1 * value)
+
+
+@piece
+def note_largest(s, size):
+    """Keep the bound of the sizes present above a new size."""
+    if size > s.count[LARGEST]:
+        s.count[LARGEST] = size

@@ -1,0 +1,145 @@
+"""The state of one replica: arrays only, so that a checkpoint is a copy of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+# Entries of State.count.
+PARTICLES = 0  # simulated particles
+EVENTS = 1  # collisions so far
+TRIALS = 2  # candidates looked at so far
+NEXT = 3  # next output time
+PHASE = 4  # DRAW or FIRE: whether an event is pending
+FIRST = 5  # slots of the pending pair; FIRST < 0: nothing happens then
+SECOND = 6
+PROCESS = 7  # process of the pending event, -1 until chosen
+WINDOW = 8  # window of time in which the rate factors are bounded
+DOUBLE_AT = 9  # double the volume when this few particles are left; 0: never
+DOUBLINGS = 10
+SMALLEST = 11  # bounds of the sizes present
+LARGEST = 12
+SINCE = 13  # collisions since these bounds were taken
+MONOMERS = 14  # what a store keeps beside its arrays
+STORED = 15
+PAUSE = 16  # 1: return at every output time
+REPAIRS = 17  # rates found above their bound
+WORST_I = 18  # sizes of the latest such pair, or of a rate that is no rate
+WORST_J = 19
+COUNTS = 20
+
+# Entries of State.clock.
+TIME = 0  # of the latest event
+PENDING = 1  # time of the next event
+VOLUME = 2
+EXTINCT = 3  # when one particle was left; NaN before
+MAJORANT = 4  # bound of the rate over the sizes present
+FLOOR = 5  # least majorant, raised by repairs
+VALUE = 6  # the value that broke a bound
+CLOCKS = 7
+
+DRAW, FIRE = 0, 1
+
+# Why the loop returned.
+DONE = 0  # every output time is recorded
+BUDGET = 1  # the budget is spent
+GROW = 2  # the store is full
+BOUND = 3  # a bound of the kernel is asked for
+BAD_RATE = 4  # a negative or undefined rate
+BAD_FACTOR = 5  # a negative or undefined factor of a process
+PAUSED = 6  # an output time was recorded
+
+
+class State(NamedTuple):
+    """State of R replicas; without the leading axis, of one.
+
+    Attributes
+    ----------
+    rng : uint64 array of shape (R, 4)
+    clock : float64 array of shape (R, CLOCKS)
+    count : int64 array of shape (R, COUNTS)
+    events : int64 array of shape (R, P)
+        Collisions that ended in each process.
+    sizes, counts : int64 arrays of shape (R, E)
+        What the latest event made, see `smolux.processes.base.PairProcess.outcome`.
+    """
+
+    rng: np.ndarray
+    clock: np.ndarray
+    count: np.ndarray
+    events: np.ndarray
+    sizes: np.ndarray
+    counts: np.ndarray
+
+
+class Windows(NamedTuple):
+    """Bounds of the rate factors of P processes in W windows of time.
+
+    Attributes
+    ----------
+    edges : float64 array of shape (W + 1,)
+        The last edge is infinite, or beyond every output time.
+    bounds : float64 array of shape (W, P)
+    total : float64 array of shape (W,)
+        Sum of the bounds.
+    """
+
+    edges: np.ndarray
+    bounds: np.ndarray
+    total: np.ndarray
+
+
+class Tally(NamedTuple):
+    """Observations of R replicas at T times; without the two leading axes, one observation.
+
+    Attributes
+    ----------
+    scalars : float64 array of shape (R, T, 5)
+        Time recorded, particles, collisions, volume, largest size.
+    events : int64 array of shape (R, T, P)
+    counts : int64 array of shape (R, T, L + 1)
+        Particles of the sizes ``1 .. L``; entry 0 is unused.
+    bins : int64 array of shape (R, T, B)
+    sums : float64 array of shape (R, T, O)
+        Sums of ``size**order`` over the sizes above L.
+    """
+
+    scalars: np.ndarray
+    events: np.ndarray
+    counts: np.ndarray
+    bins: np.ndarray
+    sums: np.ndarray
+
+
+class Grid(NamedTuple):
+    """What is observed: output times, bin edges above L, orders of moments."""
+
+    times: np.ndarray
+    edges: np.ndarray
+    orders: np.ndarray
+
+
+def new_state(rng: np.ndarray, processes: int, entries: int) -> State:
+    """Make an empty state for as many replicas as there are streams."""
+    replicas = len(rng)
+    return State(
+        rng,
+        np.zeros((replicas, CLOCKS)),
+        np.zeros((replicas, COUNTS), np.int64),
+        np.zeros((replicas, processes), np.int64),
+        np.zeros((replicas, entries), np.int64),
+        np.zeros((replicas, entries), np.int64),
+    )
+
+
+def new_tally(replicas: int, grid: Grid, sizes: int, processes: int) -> Tally:
+    """Make room for observations; `scalars` is NaN where nothing is recorded yet."""
+    shape = (replicas, len(grid.times))
+    return Tally(
+        np.full((*shape, 5), np.nan),
+        np.zeros((*shape, processes), np.int64),
+        np.zeros((*shape, sizes + 1), np.int64),
+        np.zeros((*shape, len(grid.edges)), np.int64),
+        np.zeros((*shape, len(grid.orders))),
+    )

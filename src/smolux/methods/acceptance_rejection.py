@@ -1,0 +1,275 @@
+"""Acceptance-rejection: pairs of equal chance, thinned by the rate over its bound."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ..core import rng
+from ..core.compile import piece
+from ..core.levels import level_edges, level_of, renew_majorant
+from ..core.loop import Pieces, note_largest, repair, tally_one
+from ..core.state import (
+    BAD_RATE,
+    FIRST,
+    FLOOR,
+    LARGEST,
+    MAJORANT,
+    MONOMERS,
+    PARTICLES,
+    SECOND,
+    SINCE,
+    SMALLEST,
+    STORED,
+    TRIALS,
+    VALUE,
+    VOLUME,
+    WORST_I,
+    WORST_J,
+    State,
+)
+from .base import Int, Method, Rates, enlarged
+
+#: candidates looked at before the loop may return without an event
+_PATIENCE = 4096
+#: rates of sizes up to this are tabulated when computing one costs more than reading it
+_TABLE = 192
+
+
+class Work(NamedTuple):
+    """Monomers are only counted (``count[MONOMERS]``); all other particles lie in one array.
+
+    Attributes
+    ----------
+    sizes : int64 array of shape (R, capacity)
+        The first ``count[STORED]`` entries are the particles of sizes above 1.
+    level : int64 array of shape (R, 2)
+        Levels that the bound in force covers.
+    edges, majorant, table : arrays
+        Edges of levels; bound for each pair of levels, NaN until asked for; rates of small sizes.
+    """
+
+    sizes: np.ndarray
+    level: np.ndarray
+    edges: np.ndarray
+    majorant: np.ndarray
+    table: np.ndarray
+
+
+@piece
+def _view(w, r):
+    return Work(w.sizes[r], w.level[r], w.edges, w.majorant, w.table)
+
+
+@piece
+def _size(s, w, slot):
+    # read first, choose then: which kind comes is a coin toss that no branch predictor wins
+    place = slot - s.count[MONOMERS]
+    size = w.sizes[max(place, 0)]
+    return size if place >= 0 else np.int64(1)
+
+
+@piece
+def _pair(s, w):
+    return _size(s, w, s.count[FIRST]), _size(s, w, s.count[SECOND])
+
+
+def _make_draw(rate: Any) -> Any:
+    @piece
+    def value_of(w, i, j, p):  # type: ignore[no-untyped-def]
+        n = w.table.shape[0]
+        if i <= n and j <= n:
+            return w.table[i - 1, j - 1]
+        return rate(float(i), float(j), *p)
+
+    @piece
+    def draw(s, w, p, factor):  # type: ignore[no-untyped-def]
+        n = s.count[PARTICLES]
+        s.count[FIRST] = -1
+        majorant = s.clock[MAJORANT]
+        if n < 2 or majorant <= 0.0:
+            return math.inf
+        wait = 0.0
+        for trial in range(1, _PATIENCE + 1):
+            wait += rng.exponential(s.rng)
+            a = rng.below(s.rng, n)
+            b = rng.below(s.rng, n - 1)
+            b += b >= a
+            i, j = _size(s, w, a), _size(s, w, b)
+            value = value_of(w, i, j, p)
+            if not 0.0 <= value <= majorant:
+                s.count[WORST_I], s.count[WORST_J] = i, j
+                repair(s, value)
+            if value >= majorant or rng.uniform(s.rng) * majorant < value:
+                s.count[FIRST], s.count[SECOND] = a, b
+                break
+        s.count[TRIALS] += trial
+        return wait * 2.0 * s.clock[VOLUME] / (float(n) * float(n - 1) * majorant * factor)
+
+    return draw
+
+
+@piece
+def _remove(s, w, slot):
+    """Take a particle out: the last of its kind moves into the gap."""
+    place = slot - s.count[MONOMERS]
+    stored = np.int64(place >= 0)
+    last = s.count[STORED] - stored
+    s.count[MONOMERS] -= 1 - stored
+    s.count[STORED] = last
+    # for a monomer, the entry past the end is written over itself
+    w.sizes[place if stored else last] = w.sizes[last]
+
+
+@piece
+def _insert(s, w, size, count):
+    s.count[PARTICLES] += count
+    s.count[SMALLEST] = min(s.count[SMALLEST], size)
+    note_largest(s, size)
+    if size == 1:
+        s.count[MONOMERS] += count
+        return
+    stored = s.count[STORED]
+    w.sizes[stored] = size
+    for k in range(1, count):
+        w.sizes[stored + k] = size
+    s.count[STORED] = stored + count
+
+
+@piece
+def _update(s, w, entries, p):
+    needed = np.int64(1)
+    for e in range(entries):
+        needed += s.counts[e] if s.sizes[e] > 1 else 0
+    if s.count[STORED] + needed > w.sizes.shape[0]:
+        return False
+    a, b = s.count[FIRST], s.count[SECOND]
+    # monomers are numbered first: taking the later slot first keeps the number of the other
+    _remove(s, w, max(a, b))
+    _remove(s, w, min(a, b))
+    s.count[PARTICLES] -= 2
+    for e in range(entries):
+        _insert(s, w, s.sizes[e], s.counts[e])
+    return True
+
+
+@piece
+def _prepare(s, w, p):
+    if s.count[SINCE] > s.count[PARTICLES] + 64:
+        s.count[SINCE] = 0
+        low = np.int64(1) if s.count[MONOMERS] > 0 else w.sizes[0]
+        high = low
+        for k in range(s.count[STORED]):
+            low = min(low, w.sizes[k])
+            high = max(high, w.sizes[k])
+        s.count[SMALLEST], s.count[LARGEST] = low, high
+        w.level[0], w.level[1] = w.edges.shape[0] - 2, 0
+    if s.clock[FLOOR] > s.clock[MAJORANT]:
+        if math.isinf(s.clock[FLOOR]):
+            return BAD_RATE
+        s.clock[MAJORANT] = s.clock[FLOOR]
+    elif not s.clock[VALUE] >= 0.0:
+        return BAD_RATE
+    return renew_majorant(s, w.edges, w.majorant, w.level)
+
+
+@piece
+def _double(s, w):
+    stored = s.count[STORED]
+    if 2 * stored >= w.sizes.shape[0]:
+        return False
+    for k in range(stored):
+        w.sizes[stored + k] = w.sizes[k]
+    s.count[STORED] *= 2
+    s.count[MONOMERS] *= 2
+    s.count[PARTICLES] *= 2
+    return True
+
+
+@piece
+def _visit(s, w, t, grid):
+    largest = np.int64(0)
+    if s.count[MONOMERS] > 0:
+        tally_one(t, grid, np.int64(1), s.count[MONOMERS])
+        largest = np.int64(1)
+    for k in range(s.count[STORED]):
+        tally_one(t, grid, w.sizes[k], 1)
+        largest = max(largest, w.sizes[k])
+    return largest
+
+
+@dataclass(frozen=True)
+class AcceptanceRejection(Method):
+    """Draw pairs with equal chance; accept with probability ``K(i, j) / K_max``.
+
+    ``K_max`` bounds the kernel over the pairs of sizes present. The cost of an event is the inverse of the
+    mean acceptance; the monomers of a shattering event are only counted.
+
+    References
+    ----------
+    A. L. Garcia et al., Physica A 143, 535 (1987), doi:10.1016/0378-4371(87)90205-5;
+    Kalinov et al., Algorithms 1 and 3.
+    """
+
+    name: ClassVar[str] = "acceptance-rejection"
+    title: ClassVar[str] = "acceptance-rejection"
+    reference: ClassVar[str] = "A. L. Garcia et al., Physica A 143, 535 (1987)"
+
+    work_type: ClassVar[type] = Work
+
+    @staticmethod
+    def bind(rate: Any) -> Pieces:
+        """See `Method.bind`."""
+        return Pieces(_view, _make_draw(rate), _pair, _update, _prepare, _double, _visit)
+
+    def new_work(
+        self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int
+    ) -> Work:
+        """See `Method.new_work`."""
+        stored = [int(counts[sizes > 1].sum()) for sizes, counts in populations]
+        # without growth: half of the monomers merge in pairs, or all particles once more when doubled
+        capacity = max(
+            max(m, int(counts.sum()) // 2)
+            for m, (_, counts) in zip(stored, populations, strict=True)
+        )
+        array = np.zeros((len(populations), capacity + 8), np.int64)
+        for r, (sizes, counts) in enumerate(populations):
+            above = sizes > 1
+            array[r, : stored[r]] = np.repeat(sizes[above], counts[above])
+            count = state.count[r]
+            count[MONOMERS] = counts[~above].sum()
+            count[STORED], count[PARTICLES] = stored[r], counts.sum()
+            count[SMALLEST], count[LARGEST] = sizes[0], sizes[-1]
+        edges = level_edges()
+        levels = len(edges) - 1
+        level = np.tile(np.array([levels - 1, 0]), (len(populations), 1))
+        table = rates.table(0 if rates.cheap else _TABLE)
+        return Work(array, level, edges, np.full((levels, levels), np.nan), table)
+
+    def grow(self, work: Work, state: State) -> Work:
+        """See `Method.grow`."""
+        return work._replace(sizes=enlarged(work.sizes, 2 * work.sizes.shape[1]))
+
+    def supply_bound(self, work: Work, rates: Rates, state: State, replica: int) -> None:
+        """See `Method.supply_bound`; bounds for half an octave more are computed with it."""
+        count = state.count[replica]
+        low, high = (int(level_of(work.edges, count[k])) for k in (SMALLEST, LARGEST))
+        last = min(high + 4, work.majorant.shape[1])
+        top = (work.edges[high + 1 : last + 1] - 1).astype(float)
+        bottom = np.full(top.shape, float(work.edges[low]))
+        work.majorant[low, high:last] = rates.bounds(bottom, top, bottom, top)[1]
+
+    def population(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
+        """See `Method.population`."""
+        count = state.count[replica]
+        sizes, counts = np.unique(work.sizes[replica, : count[STORED]], return_counts=True)
+        if count[MONOMERS]:
+            sizes, counts = np.append(1, sizes), np.append(count[MONOMERS], counts)
+        return sizes.astype(np.int64), counts.astype(np.int64)
+
+    def bytes_per_replica(self, particles: int) -> int:
+        """See `Method.bytes_per_replica`."""
+        return 8 * particles

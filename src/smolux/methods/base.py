@@ -1,0 +1,99 @@
+"""What every method has: how the next pair is found and how particles are stored for that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.loop import Pieces
+from ..core.state import State
+
+Float = NDArray[np.float64]
+Int = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Rates:
+    """The simulated pair rate, as a method needs to know it.
+
+    Attributes
+    ----------
+    parameters : tuple of float
+    arrays : callable
+        ``arrays(i, j)`` on arrays of sizes.
+    bounds : callable
+        See `smolux.kernels.base.Kernel.bounds`.
+    cheap : bool
+        Whether reading a table costs as much as computing the rate.
+    """
+
+    parameters: tuple[float, ...]
+    arrays: Callable[[Any, Any], Float]
+    bounds: Callable[..., tuple[Float, Float]]
+    cheap: bool
+
+    def table(self, largest: int) -> Float:
+        """Rates of the sizes ``1 .. largest`` with each other."""
+        k = np.arange(1.0, largest + 1)
+        return np.ascontiguousarray(self.arrays(k[:, None], k[None, :]), float)
+
+
+class Method:
+    """A way to draw the next event of the jump process.
+
+    A method is a frozen dataclass of its settings. Its pieces, made by `bind`, are compiled; the rest
+    runs in Python.
+
+    Attributes
+    ----------
+    name : str
+        The name in `simulate`, in case files and in the registry `METHODS`.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    reference: ClassVar[str] = ""
+
+    #: the NamedTuple of arrays that `new_work` returns
+    work_type: ClassVar[type]
+
+    @staticmethod
+    def bind(rate: Any) -> Pieces:
+        """Return the compiled pieces for a rate, the compiled ``rate(i, j, *p)``."""
+        raise NotImplementedError
+
+    def new_work(
+        self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int
+    ) -> Any:
+        """Store the initial populations (sizes, counts), one a replica, and return the work arrays.
+
+        `mass` bounds the mass of every replica at its start, and is the same for all groups of replicas.
+        """
+        raise NotImplementedError
+
+    def grow(self, work: Any, state: State) -> Any:
+        """Return the work arrays with more room."""
+        raise NotImplementedError
+
+    def supply_bound(self, work: Any, rates: Rates, state: State, replica: int) -> None:
+        """Compute the bound for which the loop returned `BOUND`."""
+        raise NotImplementedError
+
+    def population(self, work: Any, state: State, replica: int) -> tuple[Int, Int]:
+        """Return the sizes present, ascending, and their counts."""
+        raise NotImplementedError
+
+    def bytes_per_replica(self, particles: int) -> int:
+        """Estimate the memory of one replica at its start."""
+        raise NotImplementedError
+
+
+def enlarged(array: NDArray[Any], capacity: int) -> NDArray[Any]:
+    """Return a copy whose last axis has a larger capacity."""
+    new = np.zeros((*array.shape[:-1], capacity), array.dtype)
+    new[..., : array.shape[-1]] = array
+    return new

@@ -1,0 +1,469 @@
+"""The inverse method (fast DSMC): first and second particle by cumulative sums, without rejection."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ..core import rng
+from ..core.compile import piece
+from ..core.loop import Pieces, note_largest, tally_one
+from ..core.state import (
+    BAD_RATE,
+    FIRST,
+    LARGEST,
+    PARTICLES,
+    SECOND,
+    SINCE,
+    STORED,
+    TRIALS,
+    VALUE,
+    VOLUME,
+    WORST_I,
+    WORST_J,
+    State,
+)
+from ..errors import InputError
+from .base import Int, Method, Rates, enlarged
+
+#: sums are kept for blocks of this many sizes: a search looks at blocks, then inside one
+_BLOCK = 32
+#: events after which the sums are computed afresh, so that rounding does not pile up
+_REFRESH = 1 << 16
+
+
+class Work(NamedTuple):
+    """Buckets of equal particles for sizes up to B, one entry a particle above.
+
+    Slots below B are buckets, slot ``B + d`` is entry ``d`` of the large particles.
+
+    Attributes
+    ----------
+    number : float64 array of shape (R, B)
+        Particles in each bucket (whole numbers).
+    rate : float64 array of shape (R, B)
+        Rate ``S_k`` of one particle of the bucket with all others; kept up to size ``count[LARGEST]``.
+    block : float64 array of shape (R, B / 32)
+        Sums of ``number * rate`` over blocks.
+    large : int64 array of shape (R, capacity)
+        Sizes above B; the first ``count[STORED]`` are in use.
+    large_rate : float64 array of shape (R, capacity)
+    table : float64 array of shape (B, B)
+        Rates of bucket sizes with each other.
+    scratch : float64 array of shape (R, 3, B)
+    """
+
+    number: np.ndarray
+    rate: np.ndarray
+    block: np.ndarray
+    large: np.ndarray
+    large_rate: np.ndarray
+    table: np.ndarray
+    scratch: np.ndarray
+
+
+_fast = {"fastmath": {"reassoc", "contract", "nsz"}}
+
+
+@piece
+def _view(w, r):
+    return Work(
+        w.number[r], w.rate[r], w.block[r], w.large[r], w.large_rate[r], w.table, w.scratch[r]
+    )
+
+
+@piece
+def _top(s, w):
+    return min(s.count[LARGEST], w.table.shape[0])
+
+
+@piece
+def _size(w, slot):
+    buckets = w.table.shape[0]
+    return np.int64(slot + 1) if slot < buckets else w.large[slot - buckets]
+
+
+@piece
+def _pair(s, w):
+    return _size(w, s.count[FIRST]), _size(w, s.count[SECOND])
+
+
+@piece(**_fast)
+def _weigh(number, row, block, top):
+    """Sums of ``number * row`` over blocks, and in all."""
+    total = 0.0
+    for b in range((top + _BLOCK - 1) // _BLOCK):
+        x = 0.0
+        for k in range(b * _BLOCK, min((b + 1) * _BLOCK, top)):
+            x += number[k] * row[k]
+        block[b] = x
+        total += x
+    return total
+
+
+@piece(**_fast)
+def _shift(rate, row_i, row_j, gone, row_new, count, top):
+    """Account for one event in the rates of all sizes: one traversal."""
+    for k in range(top):
+        rate[k] += count * row_new[k] - gone * (row_i[k] + row_j[k])
+
+
+@piece
+def _find(number, row, block, top, x):
+    """Find the size at which the cumulative sum of ``number * row`` passes `x`; -1 if rounding beat it."""
+    for b in range((top + _BLOCK - 1) // _BLOCK):
+        if x >= block[b]:
+            x -= block[b]
+            continue
+        last = -1
+        for k in range(b * _BLOCK, min((b + 1) * _BLOCK, top)):
+            weight = number[k] * row[k]
+            if weight > 0.0:
+                last = k
+                if x < weight:
+                    return k
+                x -= weight
+        return last
+    return -1
+
+
+@piece
+def _find_large(weights, stored, x):
+    last = -1
+    for d in range(stored):
+        if weights[d] > 0.0:
+            last = d
+            if x < weights[d]:
+                return d
+            x -= weights[d]
+    return last
+
+
+@piece
+def _first(s, w, small, x):
+    """Slot of the first particle, by its rate with all others."""
+    top, buckets = _top(s, w), w.table.shape[0]
+    if x < small:
+        k = _find(w.number, w.rate, w.block, top, x)
+        if k >= 0:
+            return k
+    d = _find_large(w.large_rate, s.count[STORED], x - small)
+    return buckets + d if d >= 0 else -1
+
+
+@piece
+def _remove(s, w, slot):
+    buckets = w.table.shape[0]
+    if slot < buckets:
+        w.number[slot] -= 1.0
+    else:
+        s.count[STORED] -= 1
+        w.large[slot - buckets] = w.large[s.count[STORED]]
+        w.large_rate[slot - buckets] = w.large_rate[s.count[STORED]]
+    s.count[PARTICLES] -= 1
+
+
+@piece
+def _double(s, w):
+    stored = s.count[STORED]
+    if 2 * stored > w.large.shape[0]:
+        return False
+    for k in range(w.table.shape[0]):
+        w.number[k] *= 2.0
+    for d in range(stored):
+        w.large[stored + d] = w.large[d]
+    s.count[STORED] *= 2
+    s.count[PARTICLES] *= 2
+    s.count[SINCE] = 0
+    return True
+
+
+@piece
+def _visit(s, w, t, grid):
+    largest = np.int64(0)
+    for k in range(w.table.shape[0]):
+        if w.number[k] > 0.0:
+            largest = np.int64(k + 1)
+            tally_one(t, grid, largest, np.int64(w.number[k]))
+    for d in range(s.count[STORED]):
+        tally_one(t, grid, w.large[d], 1)
+        largest = max(largest, w.large[d])
+    return largest
+
+
+def _make_rates(rate: Any) -> tuple[Any, Any, Any]:
+    @piece
+    def pair_rate(s, w, i, j, p):  # type: ignore[no-untyped-def]
+        if i <= w.table.shape[0] and j <= w.table.shape[0]:
+            return w.table[i - 1, j - 1]
+        value = rate(float(i), float(j), *p)
+        if not 0.0 <= value < math.inf:
+            s.clock[VALUE] = value
+            s.count[WORST_I], s.count[WORST_J] = i, j
+        return value
+
+    @piece
+    def row_of(s, w, scratch, size, top, p):  # type: ignore[no-untyped-def]
+        """Rates of `size` with the sizes ``1 .. top``: a row of the table, or computed into scratch."""
+        if size <= w.table.shape[0]:
+            return w.table[size - 1]
+        row = w.scratch[scratch]
+        for k in range(top):
+            row[k] = pair_rate(s, w, np.int64(k + 1), size, p)
+        return row
+
+    @piece
+    def own_rate(s, w, size, p):  # type: ignore[no-untyped-def]
+        """Rate of a particle of `size` that is present with all others."""
+        top = _top(s, w)
+        total = _weigh(w.number, row_of(s, w, 0, size, top, p), w.block, top)
+        for d in range(s.count[STORED]):
+            total += pair_rate(s, w, size, w.large[d], p)
+        return total - pair_rate(s, w, size, size, p)
+
+    return pair_rate, row_of, own_rate
+
+
+def _make_draw(pair_rate: Any, row_of: Any) -> Any:
+    @piece
+    def second(s, w, a, p):  # type: ignore[no-untyped-def]
+        """Slot of the second particle, by its rate with the first; the first particle itself is left out."""
+        top, buckets, stored = _top(s, w), w.table.shape[0], s.count[STORED]
+        size = _size(w, a)
+        row = row_of(s, w, 0, size, top, p)
+        if a < buckets:
+            w.number[a] -= 1.0
+        small = _weigh(w.number, row, w.block, top)
+        large = 0.0
+        for d in range(stored):
+            if buckets + d != a:
+                large += pair_rate(s, w, size, w.large[d], p)
+        x = rng.uniform(s.rng) * (small + large)
+        slot = _find(w.number, row, w.block, top, x) if x < small else -1
+        if slot < 0:
+            x -= small
+            for d in range(stored):
+                weight = pair_rate(s, w, size, w.large[d], p)
+                if buckets + d != a and weight > 0.0:
+                    slot = buckets + d
+                    if x < weight:
+                        break
+                    x -= weight
+        if a < buckets:
+            w.number[a] += 1.0
+        return slot
+
+    @piece
+    def draw(s, w, p, factor):  # type: ignore[no-untyped-def]
+        s.count[FIRST] = -1
+        s.count[TRIALS] += 1
+        small = _weigh(w.number, w.rate, w.block, _top(s, w))
+        large = 0.0
+        for d in range(s.count[STORED]):
+            large += w.large_rate[d]
+        total = small + large
+        if s.count[PARTICLES] < 2 or total <= 0.0:
+            return math.inf
+        wait = rng.exponential(s.rng) * 2.0 * s.clock[VOLUME] / (total * factor)
+        a = _first(s, w, small, rng.uniform(s.rng) * total)
+        if a >= 0:
+            b = second(s, w, a, p)
+            if b >= 0:
+                s.count[FIRST], s.count[SECOND] = a, b
+        return wait
+
+    return draw
+
+
+def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
+    @piece
+    def account(s, w, i, j, gone, size, count, p):  # type: ignore[no-untyped-def]
+        """Account in the rates of all sizes for `gone` of `i` and `j` each and `count` new ones of `size`."""
+        top = _top(s, w)
+        _shift(
+            w.rate,
+            row_of(s, w, 0, i, top, p),
+            row_of(s, w, 1, j, top, p),
+            gone,
+            row_of(s, w, 2, size, top, p),
+            float(count),
+            top,
+        )
+        for d in range(s.count[STORED]):
+            large = w.large[d]
+            w.large_rate[d] += count * pair_rate(s, w, size, large, p) - gone * (
+                pair_rate(s, w, i, large, p) + pair_rate(s, w, j, large, p)
+            )
+
+    @piece
+    def arrive(s, w, size, count, p):  # type: ignore[no-untyped-def]
+        """Put `count` particles of `size` in, the rates of all others being up to date."""
+        buckets = w.table.shape[0]
+        s.count[PARTICLES] += count
+        if size <= buckets:
+            w.number[size - 1] += count
+            return
+        first = s.count[STORED]
+        for d in range(first, first + count):
+            w.large[d] = size
+        s.count[STORED] += count
+        own = own_rate(s, w, size, p)
+        for d in range(first, first + count):
+            w.large_rate[d] = own
+
+    @piece
+    def reach(s, w, size, p):  # type: ignore[no-untyped-def]
+        """Raise the largest size to which rates are kept."""
+        old = _top(s, w)
+        note_largest(s, size)
+        for k in range(old, _top(s, w)):
+            w.rate[k] = 0.0
+        for k in range(old, _top(s, w)):
+            w.rate[k] = own_rate(s, w, np.int64(k + 1), p)
+
+    @piece
+    def update(s, w, entries, p):  # type: ignore[no-untyped-def]
+        buckets = w.table.shape[0]
+        needed = 0
+        for e in range(entries):
+            if s.sizes[e] > buckets:
+                needed += s.counts[e]
+        if s.count[STORED] + needed > w.large.shape[0]:
+            return False
+        for e in range(entries):
+            reach(s, w, s.sizes[e], p)
+        i, j = _pair(s, w)
+        a, b = s.count[FIRST], s.count[SECOND]
+        # the last large particle moves into a gap: taking the later slot first keeps the other in place
+        _remove(s, w, max(a, b))
+        _remove(s, w, min(a, b))
+        for e in range(entries):
+            gone = 1.0 if e == 0 else 0.0
+            account(s, w, i, j, gone, s.sizes[e], s.counts[e], p)
+            arrive(s, w, s.sizes[e], s.counts[e], p)
+        return True
+
+    return update
+
+
+def _make_prepare(own_rate: Any) -> Any:
+    @piece
+    def renew(s, w, p):  # type: ignore[no-untyped-def]
+        """Compute every rate afresh, and the largest size."""
+        largest = np.int64(0)
+        for k in range(w.table.shape[0]):
+            if w.number[k] > 0.0:
+                largest = np.int64(k + 1)
+        for d in range(s.count[STORED]):
+            largest = max(largest, w.large[d])
+        s.count[LARGEST] = largest
+        for k in range(_top(s, w)):
+            w.rate[k] = own_rate(s, w, np.int64(k + 1), p)
+        for d in range(s.count[STORED]):
+            w.large_rate[d] = own_rate(s, w, w.large[d], p)
+        s.count[SINCE] = 1
+
+    @piece
+    def prepare(s, w, p):  # type: ignore[no-untyped-def]
+        if s.count[SINCE] == 0 or s.count[SINCE] > _REFRESH:
+            renew(s, w, p)
+        return np.int64(0) if 0.0 <= s.clock[VALUE] < math.inf else np.int64(BAD_RATE)
+
+    return prepare
+
+
+@dataclass(frozen=True)
+class Inverse(Method):
+    """Choose the first particle by its rate with all others, the second by its rate with the first.
+
+    Particles of sizes up to `buckets` are counted by size with one rate a size; larger ones are held singly.
+    An event costs a few traversals of the sizes present, and none is rejected.
+
+    Parameters
+    ----------
+    buckets : int
+        The size B up to which particles are grouped.
+
+    References
+    ----------
+    F. E. Kruis, A. Maisels, H. Fissan, AIChE J. 46, 1735 (2000), doi:10.1002/aic.690460905;
+    Kalinov et al., Algorithms 2 and 4 and section 4.
+    """
+
+    buckets: int = 1024
+
+    name: ClassVar[str] = "inverse"
+    title: ClassVar[str] = "inverse (fast DSMC)"
+    reference: ClassVar[str] = "F. E. Kruis, A. Maisels, H. Fissan, AIChE J. 46, 1735 (2000)"
+
+    work_type: ClassVar[type] = Work
+
+    @staticmethod
+    def bind(rate: Any) -> Pieces:
+        """See `Method.bind`."""
+        pair_rate, row_of, own_rate = _make_rates(rate)
+        return Pieces(
+            _view,
+            _make_draw(pair_rate, row_of),
+            _pair,
+            _make_update(pair_rate, row_of, own_rate),
+            _make_prepare(own_rate),
+            _double,
+            _visit,
+        )
+
+    def __post_init__(self) -> None:
+        if self.buckets < 1:
+            raise InputError(f"buckets = {self.buckets!r}: must be a whole number of at least 1")
+
+    def new_work(
+        self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int
+    ) -> Work:
+        """See `Method.new_work`."""
+        replicas = len(populations)
+        # no size can exceed the mass, so small systems need few buckets
+        buckets = min(self.buckets, max(_BLOCK, 2 * mass))
+        number = np.zeros((replicas, buckets))
+        stored = [int(counts[sizes > buckets].sum()) for sizes, counts in populations]
+        large = np.zeros((replicas, max(*stored, 8) * 2), np.int64)
+        for r, (sizes, counts) in enumerate(populations):
+            above = sizes > buckets
+            number[r, sizes[~above] - 1] = counts[~above]
+            large[r, : stored[r]] = np.repeat(sizes[above], counts[above])
+            count = state.count[r]
+            count[STORED], count[PARTICLES], count[LARGEST] = stored[r], counts.sum(), sizes[-1]
+        return Work(
+            number,
+            np.zeros((replicas, buckets)),
+            np.zeros((replicas, -(-buckets // _BLOCK))),
+            large,
+            np.zeros(large.shape),
+            rates.table(buckets),
+            np.zeros((replicas, 3, buckets)),
+        )
+
+    def grow(self, work: Work, state: State) -> Work:
+        """See `Method.grow`."""
+        capacity = 2 * work.large.shape[1]
+        return work._replace(
+            large=enlarged(work.large, capacity), large_rate=enlarged(work.large_rate, capacity)
+        )
+
+    def population(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
+        """See `Method.population`."""
+        number = work.number[replica]
+        small = np.flatnonzero(number)
+        large, counts = np.unique(
+            work.large[replica, : state.count[replica, STORED]], return_counts=True
+        )
+        return (
+            np.concatenate((small + 1, large)).astype(np.int64),
+            np.concatenate((number[small], counts)).astype(np.int64),
+        )
+
+    def bytes_per_replica(self, particles: int) -> int:
+        """See `Method.bytes_per_replica`."""
+        return 8 * 6 * self.buckets

@@ -1,0 +1,257 @@
+"""A group of replicas advanced together by one compiled loop: the unit of parallel work."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .assembly import factor_parameters, loop_for, rates_for, windows_for
+from .core.rng import streams
+from .core.state import (
+    BAD_FACTOR,
+    BAD_RATE,
+    BOUND,
+    BUDGET,
+    DONE,
+    DOUBLE_AT,
+    EVENTS,
+    EXTINCT,
+    FLOOR,
+    GROW,
+    PAUSE,
+    PAUSED,
+    PROCESS,
+    REPAIRS,
+    TIME,
+    TRIALS,
+    VALUE,
+    VOLUME,
+    WINDOW,
+    WORST_I,
+    WORST_J,
+    Grid,
+    State,
+    Tally,
+    new_state,
+    new_tally,
+)
+from .errors import InputError
+from .methods.base import Method
+from .model import Model
+from .weighting.base import Weighting
+
+Int = NDArray[np.int64]
+
+#: seconds between returns to Python
+_SLICE = 0.1
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that decides the outcome of a stochastic run."""
+
+    model: Model
+    times: tuple[float, ...]
+    method: Method
+    weighting: Weighting
+    population: str
+    particles: int
+    replicas: int
+    entropy: int
+    orders: tuple[float, ...]
+    sizes: int
+    bins_per_octave: int
+    distribution: bool
+
+    @property
+    def volume(self) -> float:
+        """Volume simulated at the start."""
+        return self.particles / self.model.initial.total
+
+    @cached_property
+    def grid(self) -> Grid:
+        """Output times, bin edges above the exact sizes, orders of moments."""
+        first = self.sizes + 1
+        steps = np.arange(int((62 - np.log2(first)) * self.bins_per_octave) + 1)
+        edges = np.unique([int(first * 2.0 ** (k / self.bins_per_octave)) for k in steps])
+        return Grid(np.array(self.times), edges.astype(np.int64), np.array(self.orders))
+
+    def groups(self, workers: int) -> list[tuple[int, int]]:
+        """Split the replicas: first and number of each group."""
+        together = max(1, 200_000 // self.particles)
+        each = max(1, min(together, -(-self.replicas // max(workers, 1))))
+        return [(r, min(each, self.replicas - r)) for r in range(0, self.replicas, each)]
+
+
+@dataclass
+class Group:
+    """Some replicas of a plan: their state, stores and observations; see `start`."""
+
+    plan: Plan
+    first: int
+    state: State
+    work: Any
+    tally: Tally
+    codes: Int
+    windows: Any
+    #: what was reported, once each
+    warnings: list[str] = field(default_factory=list)
+    distribution: list[list[tuple[Int, Int]]] = field(default_factory=list)
+    seconds: float = 0.0
+    compile_seconds: float = 0.0
+
+    @classmethod
+    def start(cls, plan: Plan, first: int, count: int) -> Group:
+        """Draw the initial populations of the replicas ``first .. first + count - 1``."""
+        processes = plan.model.processes
+        state = new_state(
+            streams(plan.entropy, first, count), len(processes), max(p.entries for p in processes)
+        )
+        populations = [_population(plan, r) for r in range(first, first + count)]
+        state.clock[:, VOLUME] = plan.volume
+        state.clock[:, EXTINCT] = np.nan
+        if plan.population == "doubling":
+            state.count[:, DOUBLE_AT] = plan.particles // 2
+        state.count[:, PAUSE] = plan.distribution
+        mass = plan.particles * plan.model.initial.largest
+        rates = rates_for(plan.model, plan.weighting)
+        return cls(
+            plan,
+            first,
+            state,
+            plan.method.new_work(rates, populations, state, mass),
+            new_tally(count, plan.grid, plan.sizes, len(processes)),
+            np.full(count, BUDGET, np.int64),
+            windows_for(processes, plan.times[-1]),
+            distribution=[[] for _ in range(count if plan.distribution else 0)],
+        )
+
+    @property
+    def done(self) -> bool:
+        """Whether every output time of every replica is recorded."""
+        return bool((self.codes == DONE).all())
+
+    @property
+    def events(self) -> int:
+        """Collisions so far."""
+        return int(self.state.count[:, EVENTS].sum())
+
+    @property
+    def fraction(self) -> float:
+        """Share of the simulated time that is done."""
+        reached = np.minimum(self.state.clock[:, TIME] / self.plan.times[-1], 1.0)
+        return float(np.where(self.codes == DONE, 1.0, reached).mean())
+
+    def compile(self) -> None:
+        """Compile the loop, or load it from the cache, before any clock runs."""
+        start = time.perf_counter()
+        self._call(np.full(len(self.codes), DONE, np.int64), 0)
+        self.compile_seconds = time.perf_counter() - start
+
+    def _call(self, codes: Int, budget: int) -> None:
+        plan = self.plan
+        loop_for(plan.model, plan.method, plan.weighting)(
+            self.state,
+            self.work,
+            self.tally,
+            self.windows,
+            plan.grid,
+            plan.model.kernel.parameters,
+            factor_parameters(plan.model.processes),
+            codes,
+            budget,
+        )
+
+    def advance(self, stop: Callable[[], bool]) -> None:
+        """Go on until done or until `stop` says so, asked about ten times a second."""
+        budget = 10_000
+        while not self.done and not stop():
+            before = self._effort()
+            start = time.perf_counter()
+            self._call(self.codes, budget)
+            elapsed = time.perf_counter() - start
+            self.seconds += elapsed
+            self._serve()
+            spent = self._effort() - before
+            if spent > 0.5 * budget:
+                budget = int(min(max(spent * _SLICE / max(elapsed, 1e-6), 1000), 1e10, 20 * budget))
+
+    def _effort(self) -> int:
+        return int(self.state.count[:, (TRIALS, EVENTS)].sum())
+
+    def _serve(self) -> None:
+        """Give the replicas that returned what they asked for."""
+        if (self.codes == GROW).any():
+            self.work = self.plan.method.grow(self.work, self.state)
+        waiting = np.flatnonzero(
+            (self.codes != DONE) & (self.codes != BUDGET) & (self.codes != GROW)
+        )
+        for r in waiting:
+            code = self.codes[r]
+            if code == BOUND:
+                rates = rates_for(self.plan.model, self.plan.weighting)
+                self.plan.method.supply_bound(self.work, rates, self.state, r)
+            elif code == PAUSED:
+                self.distribution[r].append(self.plan.method.population(self.work, self.state, r))
+            elif code == BAD_FACTOR:
+                self._repair_factor(r)
+            elif code == BAD_RATE:
+                raise InputError(_bad_rate(self.plan.model, self.state, r))
+
+    def _repair_factor(self, r: int) -> None:
+        """Raise the bound of a factor that was found above it."""
+        process = int(self.state.count[r, PROCESS])
+        value, window = float(self.state.clock[r, VALUE]), int(self.state.count[r, WINDOW])
+        name, text = (
+            self.plan.model.processes[process].name,
+            self.plan.model.processes[process].factor.text,
+        )
+        if not (np.isfinite(value) and value >= 0):
+            raise InputError(
+                f"the rate of {name}, {text}, is {value:.6g} near t = {self.state.clock[r, TIME]:.6g}; "
+                "it must be a finite number, zero or more"
+            )
+        self.windows.bounds[window, process] = max(
+            1.1 * value, self.windows.bounds[window, process]
+        )
+        self.windows.total[:] = self.windows.bounds.sum(axis=1)
+        self.warnings.append(
+            f"the rate of {name}, {text}, was found above its sampled bound near "
+            f"t = {self.state.clock[r, TIME]:.6g}; the bound was raised: a formula has proved bounds"
+        )
+
+    def findings(self) -> list[str]:
+        """Return all warnings, those of repaired rate bounds included."""
+        count = self.state.count
+        found = list(dict.fromkeys(self.warnings))
+        if count[:, REPAIRS].any():
+            worst = int(np.argmax(self.state.clock[:, FLOOR]))
+            i, j = count[worst, WORST_I], count[worst, WORST_J]
+            found.append(
+                f"the kernel was found above its sampled bound {count[:, REPAIRS].sum()} times in "
+                f"{count[:, TRIALS].sum()} candidates, last at sizes ({i}, {j}); the bound was raised from there "
+                "on. Give bounds= to from_function, or write the kernel as a formula, to have proved bounds"
+            )
+        return found
+
+
+def _population(plan: Plan, replica: int) -> tuple[Int, Int]:
+    sequence = np.random.SeedSequence(plan.entropy, spawn_key=(replica, 1))
+    return plan.model.initial.sample(
+        plan.particles, float(np.random.default_rng(sequence).random())
+    )
+
+
+def _bad_rate(model: Model, state: State, r: int) -> str:
+    i, j = int(state.count[r, WORST_I]), int(state.count[r, WORST_J])
+    return (
+        f"the kernel {model.kernel.name!r} gave {state.clock[r, VALUE]:.6g} for the sizes {i} and {j}, "
+        f"met at t = {state.clock[r, TIME]:.6g}; a rate must be a finite number, zero or more: "
+        "correct the function for these sizes"
+    )

@@ -1,0 +1,429 @@
+"""The stochastic entry point: checks the arguments, drives the loop in slices, observes."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import checkpoint as checkpoints
+from .errors import InputError, Interrupted, did_you_mean
+from .methods import METHODS
+from .methods.base import Method
+from .model import Model
+from .observe import to_records
+from .replicas import Group, Plan
+from .results import to_dataset
+from .weighting import WEIGHTINGS
+from .weighting.base import Weighting
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: policies for a falling number of particles
+POPULATIONS = ("doubling", "fixed-volume")
+_TICK = 0.2
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is.
+
+    Attributes
+    ----------
+    events : int
+        Collisions so far, over all replicas.
+    fraction : float
+        Share of the simulated time that is done, 0 to 1.
+    events_per_second : float
+    seconds_left : float
+        Estimated from the simulated time done so far; NaN when nothing is known yet.
+    compile_seconds : float
+        Spent on compiling, not counted in the rate.
+    """
+
+    events: int
+    fraction: float
+    events_per_second: float
+    seconds_left: float
+    compile_seconds: float
+
+
+def simulate(
+    model: Model,
+    times: ArrayLike,
+    *,
+    method: str | Method = "acceptance-rejection",
+    weighting: str | Weighting = "number",
+    population: str = "doubling",
+    particles: int = 100_000,
+    replicas: int = 8,
+    seed: int | None = None,
+    orders: Sequence[float] = (0, 1, 2, 3),
+    sizes: int = 1024,
+    bins_per_octave: int = 4,
+    distribution: bool = False,
+    executor: Executor | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
+    checkpoint_every: float = 600.0,
+    time_limit: float | None = None,
+) -> xr.Dataset:
+    """Simulate the exact jump process of a model (Marcus-Lushnikov), several replicas of it.
+
+    Parameters
+    ----------
+    model : Model
+        The physics.
+    times : array_like of shape (T,)
+        Output times, ascending, zero or more.
+    method : str or Method
+        How the next pair is found, see `smolux.methods.METHODS`.
+    weighting : str or Weighting
+        What one simulated particle stands for, see `smolux.weighting.WEIGHTINGS`.
+    population : {"doubling", "fixed-volume"}
+        Double the volume, every particle once more, when half of the initial number are left; or do not.
+    particles : int
+        Simulated particles at the start; the volume is ``particles / density``.
+    replicas : int
+        Independent runs; error bars come from the spread over them.
+    seed : int, optional
+        Entropy of the random streams, one for each replica; drawn and stored if left out. The same seed gives
+        the same numbers on any number of threads.
+    orders : sequence of float
+        Orders p of the moments ``M_p = sum_k k**p n_k``.
+    sizes : int
+        Densities are given size by size up to this size, in bins above.
+    bins_per_octave : int
+        Bins for each doubling of size.
+    distribution : bool
+        Keep the whole population at each time.
+    executor : concurrent.futures.Executor, optional
+        Where groups of replicas run; threads of this process if left out. Other executors than threads
+        run without progress and checkpoints.
+    progress : callable, optional
+        Called with a `Progress` a few times a second.
+    checkpoint : path, optional
+        File for checkpoints, written every `checkpoint_every` seconds and when the run is stopped. Removed at
+        the end.
+    checkpoint_every : float
+        Seconds between checkpoints.
+    time_limit : float, optional
+        Wall seconds after which the run stops as if interrupted.
+
+    Returns
+    -------
+    xarray.Dataset
+        With the dimensions replica, time, order, size, bin; see the page on the dataset.
+
+    Raises
+    ------
+    InputError
+        With every mistake in the arguments, or when the kernel gives no valid rate during the run.
+    Interrupted
+        On Ctrl-C, or past the time limit; holds the dataset of what was reached, and the checkpoint from which
+        `resume` goes on, bit for bit.
+
+    Notes
+    -----
+    Waiting times are exponential, so every distribution of the process is exact, fluctuations included. The mean
+    over replicas differs from the solution of the rate equations by ``O(1/particles)``; this bias is not part
+    of the spread.
+
+    Examples
+    --------
+    >>> import smolux as sx
+    >>> model = sx.Model(kernel=sx.kernels.Constant())
+    >>> ds = sx.simulate(model, times=[1, 10], particles=10_000, replicas=4, seed=1)
+    >>> float(ds["moment"].sel(order=1).mean())
+    1.0
+    """
+    plan = make_plan(
+        model, times, method, weighting, population, particles, replicas, seed, orders, sizes,
+        bins_per_octave, distribution,
+    )  # fmt: skip
+    if executor is not None and not isinstance(executor, ThreadPoolExecutor):
+        return _elsewhere(plan, executor)
+    groups = [Group.start(plan, *part) for part in plan.groups(_workers())]
+    run = _Run(plan, groups, executor, progress, checkpoint, checkpoint_every, time_limit)
+    return run.finish()
+
+
+def resume(
+    checkpoint: str | os.PathLike[str],
+    *,
+    model: Model | None = None,
+    executor: ThreadPoolExecutor | None = None,
+    progress: Callable[[Progress], None] | None = None,
+    checkpoint_every: float = 600.0,
+    time_limit: float | None = None,
+) -> xr.Dataset:
+    """Go on from a checkpoint; the data are bit for bit those of an uninterrupted run.
+
+    Parameters
+    ----------
+    checkpoint : path
+        As written by `simulate`; kept up to date, and removed at the end.
+    model : Model, optional
+        Needed only if the kernel or a rate is a Python function.
+    executor, progress, checkpoint_every, time_limit
+        As for `simulate`.
+
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    InputError, Interrupted
+        As `simulate`, and if the file cannot be read.
+    """
+    plan, groups = checkpoints.load(Path(checkpoint), model)
+    run = _Run(plan, groups, executor, progress, checkpoint, checkpoint_every, time_limit)
+    return run.finish()
+
+
+def _workers() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class _Run:
+    """Groups of replicas on threads: progress, checkpoints, interruption."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        groups: list[Group],
+        executor: ThreadPoolExecutor | None,
+        progress: Callable[[Progress], None] | None,
+        checkpoint: str | os.PathLike[str] | None,
+        checkpoint_every: float,
+        time_limit: float | None,
+    ) -> None:
+        self.plan, self.groups, self.executor, self.progress = plan, groups, executor, progress
+        self.checkpoint = None if checkpoint is None else Path(checkpoint)
+        self.every = checkpoint_every
+        self.limit = np.inf if time_limit is None else time_limit
+        self.started = time.perf_counter()
+        self.compile_seconds = 0.0
+
+    def finish(self) -> xr.Dataset:
+        """Run to the end, or raise `Interrupted` with what there is."""
+        reason = ""
+        try:
+            self.groups[0].compile()
+            self.compile_seconds = self.groups[0].compile_seconds
+            reason = self._drive()
+        except KeyboardInterrupt:
+            reason = "interrupted"
+        if reason:
+            self._save()
+            where = f"; go on from {self.checkpoint}" if self.checkpoint else ""
+            raise Interrupted(f"{reason}{where}", self._dataset(), self.checkpoint)
+        ds = self._dataset()
+        if self.checkpoint is not None:
+            self.checkpoint.unlink(missing_ok=True)
+        return ds
+
+    def _drive(self) -> str:
+        """Advance all groups; return why it stopped early, or nothing."""
+        pool = self.executor or ThreadPoolExecutor(_workers())
+        try:
+            while not all(g.done for g in self.groups):
+                if time.perf_counter() - self.started > self.limit:
+                    return f"stopped at the time limit of {self.limit:g} s"
+                self._stretch(pool)
+                if self.checkpoint is not None and not all(g.done for g in self.groups):
+                    self._save()
+        finally:
+            if self.executor is None:
+                pool.shutdown()
+        return ""
+
+    def _stretch(self, pool: Executor) -> None:
+        """Advance all groups until they are done, or until a checkpoint or the limit is due."""
+        halt = Event()
+        begun = events = 0.0
+        begun, events = time.perf_counter(), float(sum(g.events for g in self.groups))
+        due = min(begun + self.every if self.checkpoint else np.inf, self.started + self.limit)
+        waiting = [pool.submit(g.advance, halt.is_set) for g in self.groups if not g.done]
+        try:
+            while waiting and time.perf_counter() < due:
+                time.sleep(min(_TICK, 0.01 + 0.1 * (time.perf_counter() - begun)))
+                failed = [f for f in waiting if f.done() and f.exception() is not None]
+                for future in failed:
+                    future.result()
+                waiting = [f for f in waiting if not f.done()]
+                self._report(begun, events)
+        finally:
+            halt.set()
+            for future in waiting:
+                future.exception()
+        for future in waiting:
+            future.result()
+
+    def _report(self, begun: float, events_before: float) -> None:
+        if self.progress is None:
+            return
+        events = sum(g.events for g in self.groups)
+        sizes = [len(g.codes) for g in self.groups]
+        fraction = float(np.average([g.fraction for g in self.groups], weights=sizes))
+        elapsed = time.perf_counter() - begun
+        spent = time.perf_counter() - self.started - self.compile_seconds
+        left = spent * (1 - fraction) / fraction if fraction > 0 else np.nan
+        rate = (events - events_before) / elapsed if elapsed > 0 else 0.0
+        self.progress(Progress(events, fraction, rate, left, self.compile_seconds))
+
+    def _save(self) -> None:
+        if self.checkpoint is not None:
+            checkpoints.save(self.checkpoint, self.plan, self.groups)
+
+    def _dataset(self) -> xr.Dataset:
+        records = to_records(self.plan, self.groups)
+        records.attributes["wall_seconds"] = time.perf_counter() - self.started
+        return to_dataset(self.plan.model, records)
+
+
+def _run_group(plan: Plan, first: int, count: int) -> Group:
+    """Run a group to its end, in a worker of any executor."""
+    group = Group.start(plan, first, count)
+    group.compile()
+    group.advance(lambda: False)
+    return group
+
+
+def _elsewhere(plan: Plan, executor: Executor) -> xr.Dataset:
+    started = time.perf_counter()
+    workers = getattr(executor, "_max_workers", None) or _workers()
+    futures = [executor.submit(_run_group, plan, *part) for part in plan.groups(workers)]
+    records = to_records(plan, [f.result() for f in futures])
+    records.attributes["wall_seconds"] = time.perf_counter() - started
+    return to_dataset(plan.model, records)
+
+
+def make_plan(
+    model: Model,
+    times: ArrayLike,
+    method: str | Method,
+    weighting: str | Weighting,
+    population: str,
+    particles: int,
+    replicas: int,
+    seed: int | None,
+    orders: Sequence[float],
+    sizes: int,
+    bins_per_octave: int,
+    distribution: bool,
+) -> Plan:
+    """Check the arguments of `simulate`, all at once; parameters as there.
+
+    Raises
+    ------
+    InputError
+        With every mistake.
+    """
+    problems: list[str] = []
+    if not isinstance(model, Model):
+        problems.append(f"model = {model!r}: must be a smolux.Model(kernel=..., ...)")
+    found = {
+        "method": _chosen("method", method, METHODS, Method, problems),
+        "weighting": _chosen("weighting", weighting, WEIGHTINGS, Weighting, problems),
+    }
+    if population not in POPULATIONS:
+        problems.append(
+            f"population = {population!r}: unknown{did_you_mean(str(population), POPULATIONS)}"
+        )
+    numbers = {
+        "particles": _whole("particles", particles, 2, problems),
+        "replicas": _whole("replicas", replicas, 1, problems),
+        "sizes": _whole("sizes", sizes, 1, problems),
+        "bins_per_octave": _whole("bins_per_octave", bins_per_octave, 1, problems),
+    }
+    entropy = (
+        np.random.SeedSequence().entropy if seed is None else _whole("seed", seed, 0, problems)
+    )
+    output = check_times(times, problems)
+    powers = np.atleast_1d(np.asarray(orders, float))
+    if powers.ndim != 1 or not powers.size or not np.isfinite(powers).all():
+        problems.append(
+            f"orders = {orders!r}: must be a list of finite numbers, such as (0, 1, 2, 3)"
+        )
+    if problems:
+        raise InputError(problems)
+    plan = Plan(
+        model=model,
+        times=output,
+        population=population,
+        entropy=int(entropy),  # type: ignore[arg-type]
+        orders=tuple(float(p) for p in powers),
+        distribution=bool(distribution),
+        **found,
+        **numbers,  # type: ignore[arg-type]
+    )
+    _check_memory(plan)
+    return plan
+
+
+def _chosen(what: str, value: Any, registry: Sequence[Any], kind: type, problems: list[str]) -> Any:
+    if isinstance(value, kind):
+        return value
+    names = {entry.name: entry for entry in registry}
+    if isinstance(value, str) and value in names:
+        return names[value]()
+    problems.append(f"{what} = {value!r}: unknown{did_you_mean(str(value), list(names))}")
+    return None
+
+
+def _whole(what: str, value: Any, least: int, problems: list[str]) -> int:
+    try:
+        whole = int(value)
+        if whole == value and whole >= least and not isinstance(value, bool):
+            return whole
+    except (TypeError, ValueError, OverflowError):
+        pass
+    problems.append(f"{what} = {value!r}: must be a whole number of at least {least}")
+    return least
+
+
+def check_times(times: ArrayLike, problems: list[str]) -> tuple[float, ...]:
+    """Return output times as floats; add what is wrong with them to `problems`."""
+    try:
+        output = np.atleast_1d(np.asarray(times, float))
+    except (TypeError, ValueError):
+        problems.append(f"times = {times!r}: must be a list of numbers")
+        return ()
+    if output.ndim != 1 or not output.size:
+        problems.append(f"times = {times!r}: must be a list of at least one number")
+    elif not (np.isfinite(output).all() and output[0] >= 0 and output[-1] > 0):
+        problems.append(f"times = {times!r}: must be finite, zero or more, and end above zero")
+    elif (np.diff(output) <= 0).any():
+        k = int(np.argmax(np.diff(output) <= 0))
+        problems.append(f"times: must ascend, but {output[k + 1]:g} follows {output[k]:g}")
+    return tuple(float(t) for t in output.ravel())
+
+
+def _check_memory(plan: Plan) -> None:
+    """Refuse a run whose arrays cannot fit, before anything is computed."""
+    try:
+        available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):  # not known on this system
+        return
+    grid = plan.grid
+    row = 8 * (plan.sizes + len(grid.edges) + len(grid.orders) + 8)
+    observations = plan.replicas * len(plan.times) * row
+    stores = plan.replicas * plan.method.bytes_per_replica(plan.particles)
+    if observations + stores > 0.9 * available:
+        raise InputError(
+            f"the run needs about {(observations + stores) / 1e9:.1f} GB ({stores / 1e9:.1f} GB of particles, "
+            f"{observations / 1e9:.1f} GB of observations) and this machine has {available / 1e9:.1f} GB: "
+            f"lower particles = {plan.particles}, replicas = {plan.replicas}, sizes = {plan.sizes} or the number "
+            "of times"
+        )

@@ -1,0 +1,39 @@
+"""Direct simulation: one simulated particle is one particle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..kernels.base import Kernel
+from .base import Float, Weighting
+
+
+@dataclass(frozen=True)
+class Number(Weighting):
+    """Every simulated particle stands for one particle, and pairs react at the rate of the kernel.
+
+    The Marcus-Lushnikov process (A. H. Marcus, Technometrics 10, 133 (1968); A. A. Lushnikov, J. Colloid
+    Interface Sci. 65, 276 (1978)).
+    """
+
+    name: ClassVar[str] = "number"
+
+    def compiled(self, rate: Any) -> Any:
+        """See `Weighting.compiled`."""
+        return rate
+
+    def arrays(self, kernel: Kernel) -> Callable[[Any, Any], Float]:
+        """See `Weighting.arrays`."""
+        return kernel
+
+    def bounds(self, kernel: Kernel) -> Callable[..., tuple[Float, Float]]:
+        """See `Weighting.bounds`."""
+        return kernel.bounds
+
+    def stands_for(self, sizes: Float) -> Float:
+        """See `Weighting.stands_for`."""
+        return np.ones(np.shape(sizes))
