@@ -80,7 +80,7 @@ class Function:
         if any(p.kind not in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) for p in found):
             problems.append(f"{where}: give each argument by name, no *args, **kwargs or * alone")
         elif len(found) < len(arguments):
-            problems.append(f"{where}: needs {len(arguments)} arguments, as {example}")
+            problems.append(f"{where}: must take {' and '.join(arguments)}, as {example}")
         for p in found[len(arguments) :] if not problems else ():
             if p.default is p.empty:
                 problems.append(f"{where}: argument {p.name!r} needs a default, as {p.name}=1.0")

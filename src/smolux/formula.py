@@ -179,7 +179,8 @@ class _Reader:
         return self._node(tree.body, 0), self.used
 
     def _syntax(self, error: SyntaxError) -> InputError:
-        column = min(max(error.offset or 1, 1) + self.indent, len(self.text) + 1)
+        end = len(self.text.rstrip()) + 1
+        column = min(error.offset + self.indent, end) if error.offset else end
         cure = "check the parentheses and operators"
         if re.search(r"[0-9)]\s*[A-Za-z(]", self.text):
             cure += "; products need a *, as in 2*i"

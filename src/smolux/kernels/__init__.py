@@ -11,9 +11,23 @@ from .function import FunctionKernel, from_function
 from .generalized_brownian import GeneralizedBrownian
 from .multiplicative import Multiplicative
 from .product import Product
-from .registry import KERNELS, by_name, from_dict
+from .registry import by_name, from_dict
 from .sedimentation import Sedimentation
 from .shear import Shear
+
+#: every law; the name in a case file is its ``name``
+KERNELS: tuple[type[Kernel], ...] = (
+    Constant,
+    Additive,
+    Multiplicative,
+    Bilinear,
+    Product,
+    Ballistic,
+    Brownian,
+    GeneralizedBrownian,
+    Shear,
+    Sedimentation,
+)
 
 __all__ = [
     "KERNELS",

@@ -8,32 +8,14 @@ from typing import Any
 
 from smolux.errors import InputError, did_you_mean
 
-from .additive import Additive
-from .ballistic import Ballistic
 from .base import Kernel
-from .bilinear import Bilinear
-from .brownian import Brownian
-from .constant import Constant
 from .formula_kernel import formula
-from .generalized_brownian import GeneralizedBrownian
-from .multiplicative import Multiplicative
-from .product import Product
-from .sedimentation import Sedimentation
-from .shear import Shear
 
-#: every law; the name in a case file is its ``name``
-KERNELS: tuple[type[Kernel], ...] = (
-    Constant,
-    Additive,
-    Multiplicative,
-    Bilinear,
-    Product,
-    Ballistic,
-    Brownian,
-    GeneralizedBrownian,
-    Shear,
-    Sedimentation,
-)
+
+def _laws() -> tuple[type[Kernel], ...]:
+    from smolux import kernels  # the registry is the package, which imports this module
+
+    return kernels.KERNELS
 
 
 def by_name(name: str) -> type[Kernel]:
@@ -44,7 +26,7 @@ def by_name(name: str) -> type[Kernel]:
     InputError
         If there is none.
     """
-    laws = {law.name: law for law in KERNELS}
+    laws = {law.name: law for law in _laws()}
     if name not in laws:
         raise InputError(f"kernel name = {name!r}: unknown{did_you_mean(str(name), list(laws))}")
     return laws[name]
@@ -104,8 +86,8 @@ def from_dict(table: Mapping[str, Any]) -> Kernel:
 def _maker(name: str) -> Any:
     """Return the class, or the constructor after a point."""
     law, _, constructor = name.partition(".")
-    known = [law.name for law in KERNELS] + ["formula"]
-    known += [f"{law.name}.{each}" for law in KERNELS for each in law.constructors]
+    known = [law.name for law in _laws()] + ["formula"]
+    known += [f"{law.name}.{each}" for law in _laws() for each in law.constructors]
     if name not in known:
         raise InputError(f"kernel name = {name!r}: unknown{did_you_mean(name, known)}")
     return getattr(by_name(law), constructor) if constructor else by_name(law)

@@ -73,14 +73,16 @@ class Sedimentation(Kernel):
         ``scale = (2 pi / 9) density_difference gravity radius^4 / viscosity``. Every pair on a
         collision course is taken to meet (collision efficiency 1).
         """
+        number = isinstance(density_difference, (int, float, np.number))
+        contrast = abs(density_difference) if number else density_difference
         check_positive(
             "Sedimentation.stokes",
-            density_difference=abs(density_difference),
+            density_difference=contrast,
             viscosity=viscosity,
             radius=radius,
             gravity=gravity,
         )
-        speed = 2.0 / 9.0 * abs(density_difference) * gravity * radius**2 / viscosity
+        speed = 2.0 / 9.0 * contrast * gravity * radius**2 / viscosity
         return cls(math.pi * radius**2 * speed)
 
     @property
