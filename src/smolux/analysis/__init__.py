@@ -8,7 +8,7 @@ from .reference import exact_dataset, model_of
 from .scaling import mean_size, scaling
 from .select import series
 from .summary import summary
-from .table import format_table
+from .table import format_table, tables
 
 __all__ = [
     "compare",
@@ -24,4 +24,5 @@ __all__ = [
     "scaling",
     "series",
     "summary",
+    "tables",
 ]

@@ -62,6 +62,37 @@ def _sections(summary: xr.Dataset, names: Sequence[str]) -> Iterator[tuple[str, 
             yield what, variable.sel({others[0]: label})
 
 
+def tables(
+    summary: xr.Dataset, variables: Sequence[str] | None = None
+) -> list[tuple[str, list[tuple[str, ...]]]]:
+    """Turn a summary into tables of texts, for whatever shows them.
+
+    Parameters
+    ----------
+    summary : xarray.Dataset
+        Made by `smolux.summary`.
+    variables : sequence of str, optional
+        Which of number_density, moment and n; all if left out.
+
+    Returns
+    -------
+    list of (str, list of tuple of str)
+        A title and rows for each quantity; the first row is the header.
+
+    Raises
+    ------
+    InputError
+        If there is no such variable.
+    """
+    if "statistic" not in summary.dims:
+        raise InputError("summary: make it with smolux.summary(ds) first")
+    known = [str(name) for name in summary.data_vars]
+    unknown = [name for name in variables or () if name not in known]
+    if unknown:
+        raise InputError([f"variables: no {name!r}{did_you_mean(name, known)}" for name in unknown])
+    return [(title, _rows(variable)) for title, variable in _sections(summary, variables or known)]
+
+
 def format_table(summary: xr.Dataset, variables: Sequence[str] | None = None) -> str:
     """Write a summary as tables for the terminal: time, mean, 95 % half width, exact, sigmas.
 
@@ -83,15 +114,8 @@ def format_table(summary: xr.Dataset, variables: Sequence[str] | None = None) ->
     InputError
         If there is no such variable.
     """
-    if "statistic" not in summary.dims:
-        raise InputError("summary: make it with smolux.summary(ds) first")
-    known = [str(name) for name in summary.data_vars]
-    unknown = [name for name in variables or () if name not in known]
-    if unknown:
-        raise InputError([f"variables: no {name!r}{did_you_mean(name, known)}" for name in unknown])
     lines: list[str] = []
-    for title, variable in _sections(summary, variables or known):
-        rows = _rows(variable)
+    for title, rows in tables(summary, variables):
         width = [max(map(len, column)) for column in zip(*rows, strict=True)]
         lines += [
             title,
