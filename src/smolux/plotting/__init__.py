@@ -1,0 +1,25 @@
+"""Figures of results, ready for a journal: one function for each kind.
+
+Each returns a `matplotlib.figure.Figure`; it needs no display, and `save` writes it to a file.
+Most take ``ax=`` to draw into axes of your own.
+"""
+
+from .clusters import clusters
+from .comparison import comparison
+from .distribution import size_distribution
+from .oscillation import oscillations
+from .scaling import scaling
+from .series import moments, time_series
+from .style import PALETTE, save
+
+__all__ = [
+    "PALETTE",
+    "clusters",
+    "comparison",
+    "moments",
+    "oscillations",
+    "save",
+    "scaling",
+    "size_distribution",
+    "time_series",
+]

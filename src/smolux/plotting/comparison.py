@@ -1,0 +1,152 @@
+"""The same case by several methods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from smolux.analysis.reference import is_deterministic, solution_of
+from smolux.analysis.select import matches, series
+from smolux.analysis.statistics import over_replicas, quantile
+from smolux.errors import InputError
+
+from .curves import Look, draw, draw_line, draw_points, handle
+from .series import draw_reference, name_of, set_axes
+from .style import Width, legend_above, new_figure, quantity, styled, use_linear, use_log
+
+Float = NDArray[np.float64]
+
+
+def _reference(
+    results: Mapping[str, xr.Dataset], variable: str, order: float, size: int
+) -> tuple[str, Float, Float]:
+    """Find what measures the others: a solver, else the exact solution, else the first."""
+    for name, ds in results.items():
+        if is_deterministic(ds):
+            return name, ds["time"].values, series(ds, variable, order=order, size=size).values[0]
+    name, ds = next(iter(results.items()))
+    times, solution = ds["time"].values, solution_of(ds)
+    values = None
+    if solution is not None and variable in ("number_density", "moment"):
+        values = solution.moment(times, 0 if variable == "number_density" else order, gel=True)
+    elif solution is not None and variable == "n":
+        values = solution.densities(times, np.array([size]))[:, 0]
+    if values is not None and np.isfinite(values).any():
+        return "exact", times, np.asarray(values, float)
+    mean = over_replicas(series(ds, variable, order=order, size=size).values)[1]
+    return name, times, mean
+
+
+def _deviations(
+    ax: Axes,
+    ds: xr.Dataset,
+    values: Float,
+    reference: tuple[Float, Float],
+    look: Look,
+    shift: float,
+) -> None:
+    """Draw deviations in per cent at the times that the reference has too.
+
+    `shift` moves the points sideways, in steps of a hundredth of the axis.
+    """
+    times = ds["time"].values
+    here, there = matches(times, reference[0])
+    count, mean, error = over_replicas(values[:, here])
+    known = reference[1][there]
+    with np.errstate(all="ignore"):
+        percent = 100 * (mean / known - 1)
+        half = np.abs(100 * quantile(count) * error / known)
+    low, high = ax.get_xlim()
+    if ax.get_xscale() == "log":
+        x = times[here] * (high / low) ** (0.01 * shift)
+    else:
+        x = times[here] + 0.01 * shift * (high - low)
+    if is_deterministic(ds):
+        draw_line(ax, times[here], percent, look.colour)
+    else:
+        draw_points(ax, x, percent, half, look, zorder=3)
+
+
+@styled
+def comparison(
+    results: Mapping[str, xr.Dataset],
+    variable: str = "number_density",
+    *,
+    order: float = 2.0,
+    size: int = 1,
+    width: Width = "single",
+) -> Figure:
+    """Compare results of the same case: one quantity over time, and relative deviations below.
+
+    Parameters
+    ----------
+    results : mapping of str to Dataset
+        A name for each result.
+    variable : str
+        Which quantity.
+    order, size
+        Which moment or size, where the variable has several.
+    width : {"single", "double"}
+        Column width.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Deviations are measured by a solver among the results, else by the exact solution, else by
+        the first result. Bars are 95 % intervals; points at the same time stand side by side.
+
+    Raises
+    ------
+    InputError
+        If there are no results, or one has no such quantity.
+    """
+    if not isinstance(results, Mapping) or not results:
+        raise InputError(
+            "results: must be a dictionary of names and results, {'inverse': ds_1, 'solver': ds_2}"
+        )
+    curves = {k: series(ds, variable, order=order, size=size) for k, ds in results.items()}
+    figure = new_figure(width, 1.05 if width == "single" else 0.6)
+    top, bottom = figure.subplots(2, sharex=True, height_ratios=(2, 1.2))
+    first = next(iter(results.values()))
+    log_time = set_axes(top, first, np.concatenate([c.values.ravel() for c in curves.values()]))
+    (use_log if log_time else use_linear)(bottom, "x")
+    name, times, known = _reference(results, variable, order, size)
+    handles = list[Artist]()
+    if name == "exact":
+        which = {"order": order, "size": size}
+        draw_reference(top, first, solution_of(first), variable, log_time, "black", **which)
+        handles.append(Line2D([], [], color="black", label="exact"))
+    # points lie on top of each other: the earlier ones are larger and open
+    looks = {
+        label: replace(Look.number(k), hollow=k < len(results) - 1)
+        for k, label in enumerate(results)
+    }
+    if name in results and is_deterministic(results[name]):
+        looks[name] = Look("black", "o")
+    for k, (label, ds) in enumerate(results.items()):
+        layer = 2 if is_deterministic(ds) else 3
+        ring = {"ms": 3.2 + 1.8 * (len(results) - 1 - k)} if layer == 3 else {}
+        draw(top, ds, ds["time"].values, curves[label].values, looks[label], zorder=layer, **ring)
+        handles.append(handle(ds, label, looks[label]))
+    others = [label for label in results if label != name]
+    for k, label in enumerate(others):
+        shift = k - (len(others) - 1) / 2
+        values = curves[label].values
+        _deviations(bottom, results[label], values, (times, known), looks[label], shift)
+    bottom.axhline(0, color="black", lw=0.6, zorder=1)
+    use_linear(bottom, "y")
+    label = name_of(variable, order, size)
+    top.set_ylabel(quantity(label, first[variable].attrs.get("units")))
+    top.set_xlabel("")
+    bottom.set_xlabel(quantity("time $t$", first["time"].attrs.get("units")))
+    bottom.set_ylabel("deviation (%)")
+    legend_above(top, handles)
+    return figure

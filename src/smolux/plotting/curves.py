@@ -1,0 +1,151 @@
+"""How simulated and deterministic results are drawn: dots and bands, and lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from smolux.analysis.reference import is_deterministic, solution_of
+from smolux.analysis.statistics import over_replicas, quantile
+from smolux.errors import InputError
+
+from .style import GREY, MARKERS, PALETTE
+
+Float = NDArray[np.float64]
+Reference = xr.Dataset | Literal["exact"] | None
+
+#: more points than this are drawn as a line with a shaded band
+_CROWDED = 40
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colour and marker of one curve; markers are open if `hollow`."""
+
+    colour: str
+    marker: str
+    hollow: bool = False
+
+    @classmethod
+    def number(cls, k: int) -> Look:
+        """Give the k-th curve of a figure its look."""
+        return cls(PALETTE[k % len(PALETTE)], MARKERS[k % len(MARKERS)])
+
+
+def draw_values(ax: Axes, x: Float, values: Float, look: Look, **options: Any) -> None:
+    """Draw the mean of simulated replicas with 95 % intervals by Student's t.
+
+    Parameters
+    ----------
+    ax : Axes
+    x : ndarray of shape (P,)
+    values : ndarray of shape (R, P)
+        NaN where a replica was not observed. Points whose mean is zero have no place on a
+        logarithmic axis and are left out there; a bar that reaches the lower edge of such an axis
+        stands for an interval that contains zero. Without any scatter the marker is open.
+    look : Look
+    **options
+        For the markers, such as ``zorder``.
+    """
+    count, mean, error = over_replicas(values)
+    draw_points(ax, x, mean, quantile(count) * error, look, **options)
+
+
+def draw_points(ax: Axes, x: Float, mean: Float, half: Float, look: Look, **options: Any) -> None:
+    """Draw points with given half widths of their bars, NaN where they are not known."""
+    shown = np.isfinite(mean) & np.isfinite(x)
+    if ax.get_yscale() == "log":
+        shown &= mean > 0
+    if ax.get_xscale() == "log":
+        shown &= x > 0
+    x, mean, half = x[shown], mean[shown], half[shown]
+    if len(x) > _CROWDED:
+        ax.plot(x, mean, color=look.colour, lw=0.8, **options)
+        ax.fill_between(x, mean - half, mean + half, color=look.colour, alpha=0.25, lw=0)
+        return
+    known = np.isfinite(half)
+    style = {"ls": "none", "color": look.colour, "marker": look.marker, **options}
+    if known.any():
+        fill = "none" if look.hollow else look.colour
+        ax.errorbar(x[known], mean[known], yerr=half[known], elinewidth=0.8, mfc=fill, **style)
+    if not known.all():
+        ax.plot(x[~known], mean[~known], mfc="white", **style)
+
+
+def draw_line(ax: Axes, x: Float, y: Float, colour: str, style: str = "-", **options: Any) -> None:
+    """Draw a deterministic result as a line, where it is finite."""
+    shown = np.isfinite(y) & np.isfinite(x)
+    shown &= (y > 0) if ax.get_yscale() == "log" else True
+    shown &= (x > 0) if ax.get_xscale() == "log" else True
+    ax.plot(np.where(shown, x, np.nan), np.where(shown, y, np.nan), style, color=colour, **options)
+
+
+def draw(ax: Axes, ds: xr.Dataset, x: Float, values: Float, look: Look, **options: Any) -> None:
+    """Draw values of shape (R, P) of a result: simulated ones as dots, others as a line."""
+    if is_deterministic(ds):
+        draw_line(ax, x, values[0], look.colour, **options)
+    else:
+        draw_values(ax, x, values, look, **options)
+
+
+def handle(ds: xr.Dataset, label: str, look: Look | None = None) -> Artist:
+    """Legend entry of a result."""
+    look = look or Look(GREY, "o")
+    if is_deterministic(ds) or crowded(ds):
+        return Line2D([], [], color=look.colour, label=label)
+    fill = "none" if look.hollow or ds.sizes["replica"] == 1 else look.colour
+    return Line2D([], [], color=look.colour, marker=look.marker, mfc=fill, ls="none", label=label)
+
+
+def crowded(ds: xr.Dataset) -> bool:
+    """Whether the times of a simulation are so many that it is drawn as a line with a band."""
+    return not is_deterministic(ds) and ds.sizes["time"] > _CROWDED
+
+
+def described(ds: xr.Dataset) -> str:
+    """Say in a word or two where the points come from."""
+    if is_deterministic(ds):
+        return "rate equations"
+    replicas = ds.sizes["replica"]
+    return f"Monte Carlo, {replicas} replicas, 95 %" if replicas > 1 else "Monte Carlo, 1 replica"
+
+
+def fine_times(ds: xr.Dataset, log: bool) -> Float:
+    """Spread times for a smooth line over the range of a result."""
+    t = ds["time"].values
+    positive = t[t > 0]
+    if log and positive.size:
+        return np.geomspace(positive.min(), t.max(), 200)
+    return np.linspace(t.min(), t.max(), 200)
+
+
+def resolve(ds: xr.Dataset, reference: Reference) -> tuple[Any, str]:
+    """Find what to draw as the reference and what to call it; (None, "") if nothing.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+    reference : Dataset, "exact" or None
+
+    Returns
+    -------
+    reference : Dataset, exact solution or None
+    name : str
+    """
+    if reference is None or isinstance(reference, xr.Dataset):
+        name = "" if reference is None else described(reference)
+        return reference, name
+    if reference != "exact":
+        raise InputError(
+            f"reference = {reference!r}: must be a result, 'exact' or None; load a file with "
+            "smolux.results.load"
+        )
+    found = solution_of(ds)
+    return found, "exact" if found is not None else ""
