@@ -14,6 +14,7 @@ from scipy import stats
 from smolux.errors import InputError
 
 from .reference import exact_dataset, is_deterministic
+from .select import matches
 from .statistics import ROUNDING, deviation, joint_test, over_replicas, welch
 from .summary import certain_difference, mass_resolution
 
@@ -70,22 +71,12 @@ class _Side:
         return mean * volume.reshape(-1, *[1] * (mean.ndim - 1)) >= _ENOUGH
 
 
-def _matches(left: Float, right: Float) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
-    """Positions of the numbers that stand in both arrays, up to rounding."""
-    if not right.size:
-        return np.array([], int), np.array([], int)
-    order = np.argsort(right)
-    near = np.searchsorted(right[order], left * (1 - 1e-9)).clip(max=right.size - 1)
-    same = np.isclose(left, right[order][near], rtol=1e-9, atol=0)
-    return np.flatnonzero(same), order[near[same]]
-
-
 def _cut(a: _Side, b: _Side) -> None:
     """Cut both to the times, orders, sizes and bins that they share."""
     for dim in ("time", "order", "size", "bin"):
         if dim in a.ds.dims and dim in b.ds.dims:
             key = "bin_lower" if dim == "bin" else dim
-            left, right = _matches(*(side.ds[key].values.astype(float) for side in (a, b)))
+            left, right = matches(*(side.ds[key].values.astype(float) for side in (a, b)))
             a.take(**{dim: left})
             b.take(**{dim: right})
     if "bin" in a.ds.dims and "bin" in b.ds.dims:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from smolux.errors import InputError, did_you_mean
+
+Float = NDArray[np.float64]
 
 #: variables of (replica, time) and what the two with a further dimension are chosen by
 _FURTHER = {"moment": "order", "n": "size", "n_bin": "bin", "events": "process"}
@@ -51,3 +55,13 @@ def series(
             raise InputError(f"{dim} = {wanted!r}: not in the result, which has {shown}")
         values = values.sel({dim: wanted}, drop=True)
     return values.transpose("replica", "time")
+
+
+def matches(left: Float, right: Float) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Positions of the numbers that stand in both arrays, up to rounding."""
+    if not right.size:
+        return np.array([], int), np.array([], int)
+    order = np.argsort(right)
+    near = np.searchsorted(right[order], left * (1 - 1e-9)).clip(max=right.size - 1)
+    same = np.isclose(left, right[order][near], rtol=1e-9, atol=0)
+    return np.flatnonzero(same), order[near[same]]
