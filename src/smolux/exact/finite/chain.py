@@ -133,7 +133,7 @@ def partition_pmf(
 
     References
     ----------
-    A. H. Marcus, Technometrics 10, 133 (1968), doi:10.1080/00401706.1968.10490541;
+    A. H. Marcus, Technometrics 10, 133 (1968);
     A. A. Lushnikov, J. Colloid Interface Sci. 65, 276 (1978), doi:10.1016/0021-9797(78)90158-3.
     """
     import scipy.sparse.linalg
