@@ -25,9 +25,9 @@ def _checked(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def _sync(path: Path) -> None:
+def _sync(path: Path, flags: int) -> None:
     """Have the system write a file or a folder to the disk."""
-    handle = os.open(path, os.O_RDONLY)
+    handle = os.open(path, flags)
     try:
         os.fsync(handle)
     finally:
@@ -74,7 +74,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         # rather than by `tempfile`, so that the permissions are the user's usual ones
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
         yield temporary
-        _sync(temporary)
+        _sync(temporary, os.O_RDWR)
         os.replace(temporary, target)
     except OSError as error:
         _remove(temporary)
@@ -88,7 +88,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     if os.name == "posix":
         # the new name is in the folder, which some file systems will not sync
         with suppress(OSError):
-            _sync(target.parent)
+            _sync(target.parent, os.O_RDONLY)
 
 
 def _remove(path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import xarray as xr
@@ -45,7 +45,9 @@ def solution_of(ds: xr.Dataset) -> Solution | None:
     smolux.exact.Solution or None
     """
     model = model_of(ds)
-    return None if model is None else exact.solution(model)
+    # a gel reacts in a simulation; rate equations say what theirs does
+    gel: Literal["reacts", "inert"] = "inert" if ds.attrs.get("gel") == "inert" else "reacts"
+    return None if model is None else exact.solution(model, gel=gel)
 
 
 def exact_dataset(ds: xr.Dataset) -> xr.Dataset | None:
@@ -65,8 +67,8 @@ def exact_dataset(ds: xr.Dataset) -> xr.Dataset | None:
         return None
     times, orders, sizes = (ds[name].values for name in ("time", "order", "size"))
     # a simulation counts the infinite cluster, rate equations do not
-    gel = not is_deterministic(ds)
-    moments = [solution.moment(times, float(p), gel=gel) for p in orders]
+    infinite = not is_deterministic(ds)
+    moments = [solution.moment(times, float(p), gel=infinite) for p in orders]
     return xr.Dataset(
         {
             "number_density": ("time", solution.moment(times, 0)),
