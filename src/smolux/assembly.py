@@ -19,8 +19,8 @@ from .timefunction import TimeFunction
 from .weighting.base import Weighting
 
 #: windows of time for bounds of a factor that varies: pieces of each octave, first octave
-_PIECES = 16
-_FIRST_OCTAVE = -60
+_PIECES = 4
+_FIRST_OCTAVE = -20
 
 
 def _as_float(rate: Callable[..., Any]) -> Any:
@@ -119,7 +119,7 @@ def _bounds(factor: TimeFunction, end: float) -> tuple[tuple[float, ...], tuple[
 def windows_for(processes: Sequence[PairProcess], end: float) -> Windows:
     """Bound the rate factors over windows of time that depend on the factors alone.
 
-    A factor that does not vary needs one window without end. Others have sixteen windows an octave of
+    A factor that does not vary needs one window without end. Others have four windows an octave of
     time, whatever the output times are, so that a trajectory does not depend on these.
 
     Raises

@@ -42,6 +42,7 @@ from .core.state import (
     new_tally,
 )
 from .errors import InputError
+from .initial import Sizes
 from .methods.base import Method
 from .model import Model
 from .weighting.base import Weighting
@@ -242,10 +243,11 @@ class Group:
 
 
 def _population(plan: Plan, replica: int) -> tuple[Int, Int]:
+    initial = plan.model.initial
+    if isinstance(initial, Sizes) and len(initial.sizes) == 1:  # nothing to draw
+        return np.array(initial.sizes), np.array([plan.particles])
     sequence = np.random.SeedSequence(plan.entropy, spawn_key=(replica, 1))
-    return plan.model.initial.sample(
-        plan.particles, float(np.random.default_rng(sequence).random())
-    )
+    return initial.sample(plan.particles, float(np.random.default_rng(sequence).random()))
 
 
 def _bad_rate(model: Model, state: State, r: int) -> str:

@@ -33,7 +33,12 @@ except ImportError:  # a later Numba: compile without a cache
     _HOOKS = False
 
 #: a private option of Numba; without it loops are slower, not wrong
-_NO_COUNTING = {"_nrt": False} if "_nrt" in getattr(numba.core.options.DefaultOptions, "__dict__", {}) else {}
+_NO_COUNTING = (
+    {"_nrt": False} if "_nrt" in getattr(numba.core.options.DefaultOptions, "__dict__", {}) else {}
+)
+
+#: pieces are called from compiled code only; to call one from Python, take its ``py_func``
+_NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 #: compile seconds and cache hits of this process, for reports
 statistics = {"hits": 0, "misses": 0}
@@ -64,6 +69,8 @@ class _Digest:
             self._function(value.py_func)
         elif isinstance(value, types.FunctionType):
             self._function(value)
+        elif isinstance(getattr(value, "_defn", None), types.FunctionType):  # an intrinsic
+            self._function(value._defn)
         elif isinstance(value, types.CodeType):
             self._code(value)
         elif isinstance(value, types.ModuleType):
@@ -203,7 +210,14 @@ def piece(fn: Callable[..., Any] | None = None, /, **options: Any) -> Any:
     Nothing is allocated in a loop, so reference counting is off: with it, an event would spend more
     time counting references to the arrays of the state than on its own work.
     """
-    settings = {"nogil": True, "error_model": "numpy", "forceinline": True, **_NO_COUNTING, **options}
+    settings = {
+        "nogil": True,
+        "error_model": "numpy",
+        "forceinline": True,
+        **_NO_WRAPPERS,
+        **_NO_COUNTING,
+        **options,
+    }
     compiler = numba.njit(**settings)
     return compiler if fn is None else compiler(fn)
 
@@ -220,7 +234,7 @@ def user_piece(fn: Callable[..., Any]) -> Any:
 
 def entry(fn: Callable[..., Any]) -> Any:
     """Compile an assembled loop, called from Python, with the disk cache."""
-    dispatcher = cold_piece(fn)
+    dispatcher = piece(fn, forceinline=False, **dict.fromkeys(_NO_WRAPPERS, False))
     directory = cache_directory()
     if _HOOKS and directory is not None and hasattr(dispatcher, "_cache"):
         dispatcher._cache = _ContentCache(dispatcher, directory)

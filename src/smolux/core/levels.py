@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from .compile import piece
+from .compile import cold_piece, piece
 from .state import BOUND, FLOOR, LARGEST, MAJORANT, SMALLEST
 
 
@@ -35,14 +35,8 @@ def level_of(edges, size):
     return low
 
 
-@piece
-def renew_majorant(s, edges, table, level):
-    """Put the bound over the sizes present into the state; `BOUND` if it is not in the table yet.
-
-    ``level[0], level[1]`` are the levels the bound in force covers.
-    """
-    if s.count[SMALLEST] >= edges[level[0]] and s.count[LARGEST] < edges[level[1] + 1]:
-        return 0
+@cold_piece
+def _change_levels(s, edges, table, level):
     low = level_of(edges, s.count[SMALLEST])
     high = level_of(edges, s.count[LARGEST])
     value = table[low, high]
@@ -51,3 +45,14 @@ def renew_majorant(s, edges, table, level):
     level[0], level[1] = low, high
     s.clock[MAJORANT] = max(value, s.clock[FLOOR])
     return 0
+
+
+@piece
+def renew_majorant(s, edges, table, level):
+    """Put the bound over the sizes present into the state; `BOUND` if it is not in the table yet.
+
+    ``level[0], level[1]`` are the levels the bound in force covers.
+    """
+    if s.count[SMALLEST] >= edges[level[0]] and s.count[LARGEST] < edges[level[1] + 1]:
+        return 0
+    return _change_levels(s, edges, table, level)

@@ -292,7 +292,7 @@ def make_loop(
     return entry(loop)
 
 
-@piece
+@cold_piece
 def repair(s, value):
     """Note a rate above its bound and raise the bound for the rest of the run."""
     s.count[REPAIRS] += 1

@@ -9,9 +9,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ..core import rng
-from ..core.compile import piece
+from ..core.compile import cold_piece, piece
 from ..core.levels import level_edges, level_of, renew_majorant
 from ..core.loop import Pieces, note_largest, repair, tally_one
+from ..core.prefetch import prefetch
 from ..core.state import (
     BAD_RATE,
     FIRST,
@@ -35,6 +36,8 @@ from .base import Int, Method, Rates, enlarged
 
 #: candidates looked at before the loop may return without an event
 _PATIENCE = 4096
+#: candidates whose pairs are drawn ahead, so that their memory is there when it is needed
+_AHEAD = 8
 #: rates of sizes up to this are tabulated when computing one costs more than reading it
 _TABLE = 192
 
@@ -46,6 +49,8 @@ class Work(NamedTuple):
     ----------
     sizes : int64 array of shape (R, capacity)
         The first ``count[STORED]`` entries are the particles of sizes above 1.
+    ahead : float64 array of shape (R, 16)
+        Uniform numbers that choose the pairs of the next candidates; -1 before the first.
     level : int64 array of shape (R, 2)
         Levels that the bound in force covers.
     edges, majorant, table : arrays
@@ -53,6 +58,7 @@ class Work(NamedTuple):
     """
 
     sizes: np.ndarray
+    ahead: np.ndarray
     level: np.ndarray
     edges: np.ndarray
     majorant: np.ndarray
@@ -61,7 +67,7 @@ class Work(NamedTuple):
 
 @piece
 def _view(w, r):
-    return Work(w.sizes[r], w.level[r], w.edges, w.majorant, w.table)
+    return Work(w.sizes[r], w.ahead[r], w.level[r], w.edges, w.majorant, w.table)
 
 
 @piece
@@ -75,6 +81,19 @@ def _size(s, w, slot):
 @piece
 def _pair(s, w):
     return _size(s, w, s.count[FIRST]), _size(s, w, s.count[SECOND])
+
+
+@piece
+def _look_ahead(s, w, k):
+    """Draw the pair of a later candidate and ask for its memory.
+
+    The number of particles will have changed by a few when its turn comes, which leaves the place within the
+    same stretch of memory.
+    """
+    for m in range(k, k + 2):
+        w.ahead[m] = rng.uniform(s.rng)
+        place = np.int64(w.ahead[m] * s.count[PARTICLES]) - s.count[MONOMERS]
+        prefetch(w.sizes, max(place, 0))
 
 
 def _make_draw(rate: Any) -> Any:
@@ -92,12 +111,17 @@ def _make_draw(rate: Any) -> Any:
         majorant = s.clock[MAJORANT]
         if n < 2 or majorant <= 0.0:
             return math.inf
+        if w.ahead[0] < 0.0:
+            for k in range(0, 2 * _AHEAD, 2):
+                _look_ahead(s, w, k)
         wait = 0.0
-        for trial in range(1, _PATIENCE + 1):
+        for trial in range(s.count[TRIALS], s.count[TRIALS] + _PATIENCE):
+            s.count[TRIALS] += 1
             wait += rng.exponential(s.rng)
-            a = rng.below(s.rng, n)
-            b = rng.below(s.rng, n - 1)
+            k = 2 * (trial % _AHEAD)
+            a, b = np.int64(w.ahead[k] * n), np.int64(w.ahead[k + 1] * (n - 1))
             b += b >= a
+            _look_ahead(s, w, k)
             i, j = _size(s, w, a), _size(s, w, b)
             value = value_of(w, i, j, p)
             if not 0.0 <= value <= majorant:
@@ -106,7 +130,6 @@ def _make_draw(rate: Any) -> Any:
             if value >= majorant or rng.uniform(s.rng) * majorant < value:
                 s.count[FIRST], s.count[SECOND] = a, b
                 break
-        s.count[TRIALS] += trial
         return wait * 2.0 * s.clock[VOLUME] / (float(n) * float(n - 1) * majorant * factor)
 
     return draw
@@ -156,17 +179,23 @@ def _update(s, w, entries, p):
     return True
 
 
+@cold_piece
+def _rescan(s, w):
+    """Take the smallest and largest size afresh; the bound in force is then renewed."""
+    s.count[SINCE] = 0
+    low = np.int64(1) if s.count[MONOMERS] > 0 else w.sizes[0]
+    high = low
+    for k in range(s.count[STORED]):
+        low = min(low, w.sizes[k])
+        high = max(high, w.sizes[k])
+    s.count[SMALLEST], s.count[LARGEST] = low, high
+    w.level[0], w.level[1] = w.edges.shape[0] - 2, 0
+
+
 @piece
 def _prepare(s, w, p):
     if s.count[SINCE] > s.count[PARTICLES] + 64:
-        s.count[SINCE] = 0
-        low = np.int64(1) if s.count[MONOMERS] > 0 else w.sizes[0]
-        high = low
-        for k in range(s.count[STORED]):
-            low = min(low, w.sizes[k])
-            high = max(high, w.sizes[k])
-        s.count[SMALLEST], s.count[LARGEST] = low, high
-        w.level[0], w.level[1] = w.edges.shape[0] - 2, 0
+        _rescan(s, w)
     if s.clock[FLOOR] > s.clock[MAJORANT]:
         if math.isinf(s.clock[FLOOR]):
             return BAD_RATE
@@ -176,7 +205,7 @@ def _prepare(s, w, p):
     return renew_majorant(s, w.edges, w.majorant, w.level)
 
 
-@piece
+@cold_piece
 def _double(s, w):
     stored = s.count[STORED]
     if 2 * stored >= w.sizes.shape[0]:
@@ -189,7 +218,7 @@ def _double(s, w):
     return True
 
 
-@piece
+@cold_piece
 def _visit(s, w, t, grid):
     largest = np.int64(0)
     if s.count[MONOMERS] > 0:
@@ -243,11 +272,12 @@ class AcceptanceRejection(Method):
             count[MONOMERS] = counts[~above].sum()
             count[STORED], count[PARTICLES] = stored[r], counts.sum()
             count[SMALLEST], count[LARGEST] = sizes[0], sizes[-1]
+        ahead = np.full((len(populations), 2 * _AHEAD), -1.0)
         edges = level_edges()
         levels = len(edges) - 1
         level = np.tile(np.array([levels - 1, 0]), (len(populations), 1))
         table = rates.table(0 if rates.cheap else _TABLE)
-        return Work(array, level, edges, np.full((levels, levels), np.nan), table)
+        return Work(array, ahead, level, edges, np.full((levels, levels), np.nan), table)
 
     def grow(self, work: Work, state: State) -> Work:
         """See `Method.grow`."""
@@ -256,7 +286,7 @@ class AcceptanceRejection(Method):
     def supply_bound(self, work: Work, rates: Rates, state: State, replica: int) -> None:
         """See `Method.supply_bound`; bounds for half an octave more are computed with it."""
         count = state.count[replica]
-        low, high = (int(level_of(work.edges, count[k])) for k in (SMALLEST, LARGEST))
+        low, high = (int(level_of.py_func(work.edges, count[k])) for k in (SMALLEST, LARGEST))
         last = min(high + 4, work.majorant.shape[1])
         top = (work.edges[high + 1 : last + 1] - 1).astype(float)
         bottom = np.full(top.shape, float(work.edges[low]))

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ..core import rng
-from ..core.compile import piece
+from ..core.compile import cold_piece, piece
 from ..core.loop import Pieces, note_largest, tally_one
 from ..core.state import (
     BAD_RATE,
@@ -44,16 +44,15 @@ class Work(NamedTuple):
     ----------
     number : float64 array of shape (R, B)
         Particles in each bucket (whole numbers).
-    rate : float64 array of shape (R, B)
+    rate : float64 array of shape (R, 1, B)
         Rate ``S_k`` of one particle of the bucket with all others; kept up to size ``count[LARGEST]``.
     block : float64 array of shape (R, B / 32)
         Sums of ``number * rate`` over blocks.
     large : int64 array of shape (R, capacity)
         Sizes above B; the first ``count[STORED]`` are in use.
     large_rate : float64 array of shape (R, capacity)
-    table : float64 array of shape (B, B)
-        Rates of bucket sizes with each other.
-    scratch : float64 array of shape (R, 3, B)
+    table : float64 array of shape (B + 3, B)
+        Rates of bucket sizes with each other; the last three rows are scratch for larger sizes.
     """
 
     number: np.ndarray
@@ -62,27 +61,24 @@ class Work(NamedTuple):
     large: np.ndarray
     large_rate: np.ndarray
     table: np.ndarray
-    scratch: np.ndarray
 
 
-_fast = {"fastmath": {"reassoc", "contract", "nsz"}}
+_fast = {"fastmath": {"reassoc", "contract", "nsz"}, "forceinline": False}
 
 
 @piece
 def _view(w, r):
-    return Work(
-        w.number[r], w.rate[r], w.block[r], w.large[r], w.large_rate[r], w.table, w.scratch[r]
-    )
+    return Work(w.number[r], w.rate[r], w.block[r], w.large[r], w.large_rate[r], w.table)
 
 
 @piece
 def _top(s, w):
-    return min(s.count[LARGEST], w.table.shape[0])
+    return min(s.count[LARGEST], w.table.shape[1])
 
 
 @piece
 def _size(w, slot):
-    buckets = w.table.shape[0]
+    buckets = w.table.shape[1]
     return np.int64(slot + 1) if slot < buckets else w.large[slot - buckets]
 
 
@@ -92,35 +88,35 @@ def _pair(s, w):
 
 
 @piece(**_fast)
-def _weigh(number, row, block, top):
-    """Sums of ``number * row`` over blocks, and in all."""
+def _weigh(number, rates, row, block, top):
+    """Sums of ``number * rates[row]`` over blocks, and in all."""
     total = 0.0
     for b in range((top + _BLOCK - 1) // _BLOCK):
         x = 0.0
         for k in range(b * _BLOCK, min((b + 1) * _BLOCK, top)):
-            x += number[k] * row[k]
+            x += number[k] * rates[row, k]
         block[b] = x
         total += x
     return total
 
 
 @piece(**_fast)
-def _shift(rate, row_i, row_j, gone, row_new, count, top):
-    """Account for one event in the rates of all sizes: one traversal."""
+def _shift(rate, table, i, j, gone, new, count, top):
+    """Account for one event in the rates of all sizes: one traversal of three rows."""
     for k in range(top):
-        rate[k] += count * row_new[k] - gone * (row_i[k] + row_j[k])
+        rate[k] += count * table[new, k] - gone * (table[i, k] + table[j, k])
 
 
 @piece
-def _find(number, row, block, top, x):
-    """Find the size at which the cumulative sum of ``number * row`` passes `x`; -1 if rounding beat it."""
+def _find(number, rates, row, block, top, x):
+    """Find the size at which the cumulative sum of ``number * rates[row]`` passes `x`; -1 if rounding beat it."""
     for b in range((top + _BLOCK - 1) // _BLOCK):
         if x >= block[b]:
             x -= block[b]
             continue
         last = -1
         for k in range(b * _BLOCK, min((b + 1) * _BLOCK, top)):
-            weight = number[k] * row[k]
+            weight = number[k] * rates[row, k]
             if weight > 0.0:
                 last = k
                 if x < weight:
@@ -142,12 +138,12 @@ def _find_large(weights, stored, x):
     return last
 
 
-@piece
+@cold_piece
 def _first(s, w, small, x):
     """Slot of the first particle, by its rate with all others."""
-    top, buckets = _top(s, w), w.table.shape[0]
+    top, buckets = _top(s, w), w.table.shape[1]
     if x < small:
-        k = _find(w.number, w.rate, w.block, top, x)
+        k = _find(w.number, w.rate, 0, w.block, top, x)
         if k >= 0:
             return k
     d = _find_large(w.large_rate, s.count[STORED], x - small)
@@ -156,7 +152,7 @@ def _first(s, w, small, x):
 
 @piece
 def _remove(s, w, slot):
-    buckets = w.table.shape[0]
+    buckets = w.table.shape[1]
     if slot < buckets:
         w.number[slot] -= 1.0
     else:
@@ -166,12 +162,12 @@ def _remove(s, w, slot):
     s.count[PARTICLES] -= 1
 
 
-@piece
+@cold_piece
 def _double(s, w):
     stored = s.count[STORED]
     if 2 * stored > w.large.shape[0]:
         return False
-    for k in range(w.table.shape[0]):
+    for k in range(w.table.shape[1]):
         w.number[k] *= 2.0
     for d in range(stored):
         w.large[stored + d] = w.large[d]
@@ -181,10 +177,10 @@ def _double(s, w):
     return True
 
 
-@piece
+@cold_piece
 def _visit(s, w, t, grid):
     largest = np.int64(0)
-    for k in range(w.table.shape[0]):
+    for k in range(w.table.shape[1]):
         if w.number[k] > 0.0:
             largest = np.int64(k + 1)
             tally_one(t, grid, largest, np.int64(w.number[k]))
@@ -197,7 +193,7 @@ def _visit(s, w, t, grid):
 def _make_rates(rate: Any) -> tuple[Any, Any, Any]:
     @piece
     def pair_rate(s, w, i, j, p):  # type: ignore[no-untyped-def]
-        if i <= w.table.shape[0] and j <= w.table.shape[0]:
+        if i <= w.table.shape[1] and j <= w.table.shape[1]:
             return w.table[i - 1, j - 1]
         value = rate(float(i), float(j), *p)
         if not 0.0 <= value < math.inf:
@@ -205,21 +201,22 @@ def _make_rates(rate: Any) -> tuple[Any, Any, Any]:
             s.count[WORST_I], s.count[WORST_J] = i, j
         return value
 
-    @piece
+    @cold_piece
     def row_of(s, w, scratch, size, top, p):  # type: ignore[no-untyped-def]
-        """Rates of `size` with the sizes ``1 .. top``: a row of the table, or computed into scratch."""
-        if size <= w.table.shape[0]:
-            return w.table[size - 1]
-        row = w.scratch[scratch]
+        """Row of the table with the rates of `size` with the sizes ``1 .. top``."""
+        buckets = w.table.shape[1]
+        if size <= buckets:
+            return size - 1
+        row = buckets + scratch
         for k in range(top):
-            row[k] = pair_rate(s, w, np.int64(k + 1), size, p)
-        return row
+            w.table[row, k] = pair_rate(s, w, np.int64(k + 1), size, p)
+        return np.int64(row)
 
-    @piece
+    @cold_piece
     def own_rate(s, w, size, p):  # type: ignore[no-untyped-def]
         """Rate of a particle of `size` that is present with all others."""
         top = _top(s, w)
-        total = _weigh(w.number, row_of(s, w, 0, size, top, p), w.block, top)
+        total = _weigh(w.number, w.table, row_of(s, w, 0, size, top, p), w.block, top)
         for d in range(s.count[STORED]):
             total += pair_rate(s, w, size, w.large[d], p)
         return total - pair_rate(s, w, size, size, p)
@@ -228,21 +225,21 @@ def _make_rates(rate: Any) -> tuple[Any, Any, Any]:
 
 
 def _make_draw(pair_rate: Any, row_of: Any) -> Any:
-    @piece
+    @cold_piece
     def second(s, w, a, p):  # type: ignore[no-untyped-def]
         """Slot of the second particle, by its rate with the first; the first particle itself is left out."""
-        top, buckets, stored = _top(s, w), w.table.shape[0], s.count[STORED]
+        top, buckets, stored = _top(s, w), w.table.shape[1], s.count[STORED]
         size = _size(w, a)
         row = row_of(s, w, 0, size, top, p)
         if a < buckets:
             w.number[a] -= 1.0
-        small = _weigh(w.number, row, w.block, top)
+        small = _weigh(w.number, w.table, row, w.block, top)
         large = 0.0
         for d in range(stored):
             if buckets + d != a:
                 large += pair_rate(s, w, size, w.large[d], p)
         x = rng.uniform(s.rng) * (small + large)
-        slot = _find(w.number, row, w.block, top, x) if x < small else -1
+        slot = _find(w.number, w.table, row, w.block, top, x) if x < small else -1
         if slot < 0:
             x -= small
             for d in range(stored):
@@ -256,11 +253,11 @@ def _make_draw(pair_rate: Any, row_of: Any) -> Any:
             w.number[a] += 1.0
         return slot
 
-    @piece
+    @cold_piece
     def draw(s, w, p, factor):  # type: ignore[no-untyped-def]
         s.count[FIRST] = -1
         s.count[TRIALS] += 1
-        small = _weigh(w.number, w.rate, w.block, _top(s, w))
+        small = _weigh(w.number, w.rate, 0, w.block, _top(s, w))
         large = 0.0
         for d in range(s.count[STORED]):
             large += w.large_rate[d]
@@ -279,12 +276,13 @@ def _make_draw(pair_rate: Any, row_of: Any) -> Any:
 
 
 def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
-    @piece
+    @cold_piece
     def account(s, w, i, j, gone, size, count, p):  # type: ignore[no-untyped-def]
         """Account in the rates of all sizes for `gone` of `i` and `j` each and `count` new ones of `size`."""
         top = _top(s, w)
         _shift(
-            w.rate,
+            w.rate[0],
+            w.table,
             row_of(s, w, 0, i, top, p),
             row_of(s, w, 1, j, top, p),
             gone,
@@ -298,10 +296,10 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
                 pair_rate(s, w, i, large, p) + pair_rate(s, w, j, large, p)
             )
 
-    @piece
+    @cold_piece
     def arrive(s, w, size, count, p):  # type: ignore[no-untyped-def]
         """Put `count` particles of `size` in, the rates of all others being up to date."""
-        buckets = w.table.shape[0]
+        buckets = w.table.shape[1]
         s.count[PARTICLES] += count
         if size <= buckets:
             w.number[size - 1] += count
@@ -314,19 +312,19 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
         for d in range(first, first + count):
             w.large_rate[d] = own
 
-    @piece
+    @cold_piece
     def reach(s, w, size, p):  # type: ignore[no-untyped-def]
         """Raise the largest size to which rates are kept."""
         old = _top(s, w)
         note_largest(s, size)
         for k in range(old, _top(s, w)):
-            w.rate[k] = 0.0
+            w.rate[0, k] = 0.0
         for k in range(old, _top(s, w)):
-            w.rate[k] = own_rate(s, w, np.int64(k + 1), p)
+            w.rate[0, k] = own_rate(s, w, np.int64(k + 1), p)
 
-    @piece
+    @cold_piece
     def update(s, w, entries, p):  # type: ignore[no-untyped-def]
-        buckets = w.table.shape[0]
+        buckets = w.table.shape[1]
         needed = 0
         for e in range(entries):
             if s.sizes[e] > buckets:
@@ -350,18 +348,18 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
 
 
 def _make_prepare(own_rate: Any) -> Any:
-    @piece
+    @cold_piece
     def renew(s, w, p):  # type: ignore[no-untyped-def]
         """Compute every rate afresh, and the largest size."""
         largest = np.int64(0)
-        for k in range(w.table.shape[0]):
+        for k in range(w.table.shape[1]):
             if w.number[k] > 0.0:
                 largest = np.int64(k + 1)
         for d in range(s.count[STORED]):
             largest = max(largest, w.large[d])
         s.count[LARGEST] = largest
         for k in range(_top(s, w)):
-            w.rate[k] = own_rate(s, w, np.int64(k + 1), p)
+            w.rate[0, k] = own_rate(s, w, np.int64(k + 1), p)
         for d in range(s.count[STORED]):
             w.large_rate[d] = own_rate(s, w, w.large[d], p)
         s.count[SINCE] = 1
@@ -437,12 +435,11 @@ class Inverse(Method):
             count[STORED], count[PARTICLES], count[LARGEST] = stored[r], counts.sum(), sizes[-1]
         return Work(
             number,
-            np.zeros((replicas, buckets)),
+            np.zeros((replicas, 1, buckets)),
             np.zeros((replicas, -(-buckets // _BLOCK))),
             large,
             np.zeros(large.shape),
-            rates.table(buckets),
-            np.zeros((replicas, 3, buckets)),
+            np.vstack((rates.table(buckets), np.zeros((3, buckets)))),
         )
 
     def grow(self, work: Work, state: State) -> Work:
