@@ -42,7 +42,7 @@ def solution(model: Model, *, gel: Literal["reacts", "inert"] = "reacts") -> Sol
         None if no exact solution is known.
     """
     rates = _rates(model)
-    law = _coefficients(model.kernel)
+    law = coefficients(model.kernel)
     if rates is None or law is None or model.initial.largest != 1:
         return None
     aggregation, lam = rates
@@ -72,7 +72,7 @@ def _rates(model: Model) -> tuple[float, float] | None:
     return aggregation, shattering / aggregation
 
 
-def _coefficients(kernel: Kernel) -> tuple[float, float, float] | None:
+def coefficients(kernel: Kernel) -> tuple[float, float, float] | None:
     """Return ``c, a, b`` of a kernel ``c + a (i + j) + b i j`` that declares an exact solution."""
     if kernel.exact is None:
         return None
@@ -82,6 +82,8 @@ def _coefficients(kernel: Kernel) -> tuple[float, float, float] | None:
     c = k11 - 2 * a - b
     # differences of equal numbers leave rounding errors
     c, a, b = (x if x > 4e-15 * abs(k22) else 0.0 for x in (c, a, b))
+    if np.count_nonzero((c, a, b)) == 1:  # then no difference is needed
+        c, a, b = (k11 / ways if x else 0.0 for x, ways in ((c, 1), (a, 2), (b, 1)))
     i, j = _SIZES[:, None], _SIZES
     if not np.allclose(kernel(i, j), c + a * (i + j) + b * i * j, rtol=1e-9, atol=0):
         return None

@@ -56,7 +56,7 @@ def _taylor(
 def _frobenius(
     rho: Complex, w: Complex, p: Complex, x: float, decay: float, drift: float
 ) -> tuple[Complex, Complex]:
-    """Carry ``w`` and ``p`` from `x` to ``x exp(-decay)``, up to a common factor."""
+    """Carry ``w`` and ``p`` from `x` to ``x exp(-decay)``, up to a common factor above 0."""
     root = np.sqrt(drift * drift - 4 * rho)
     values = []
     for exponent, other in (((drift - root) / 2, -root), ((drift + root) / 2, root)):
@@ -76,29 +76,15 @@ def _frobenius(
     wronskian = slow[0] * fast[1] - slow[1] * fast[0]
     share_slow = (w * fast[1] - p * fast[0]) / wronskian
     share_fast = (p * slow[0] - w * slow[1]) / wronskian * np.exp(-decay * root)
+    phase = np.exp(0.5j * decay * root.imag)
     return (
-        share_slow * slow_end[0] + share_fast * fast_end[0],
-        share_slow * slow_end[1] + share_fast * fast_end[1],
+        phase * (share_slow * slow_end[0] + share_fast * fast_end[0]),
+        phase * (share_slow * slow_end[1] + share_fast * fast_end[1]),
     )
 
 
-def generating_function(z: Complex, lam: float, t: float) -> Complex:
-    """Evaluate ``G(t; z)`` for unit density and kernel.
-
-    Parameters
-    ----------
-    z : ndarray of complex
-        Points, off the real axis or above the radius of convergence of the steady state.
-    lam : float
-        Shattering rate.
-    t : float
-        Time, above 0 and finite.
-
-    Returns
-    -------
-    ndarray of complex
-        Of the shape of `z`.
-    """
+def _solve(z: Complex, lam: float, t: float) -> tuple[Complex, Complex]:
+    """Return ``w`` and ``theta w`` at the time `t`, up to a common factor above 0."""
     nu = 2 / (1 + 2 * lam)
     drift = (1 + lam) * nu
     rho = z * (nu / 2)
@@ -119,6 +105,27 @@ def generating_function(z: Complex, lam: float, t: float) -> Complex:
         scale = np.abs(w) + np.abs(p)
         w, p = w / scale, p / scale
         x, gap = x * (1 + h), gap - x * h
+    return w, p
+
+
+def generating_function(z: Complex, lam: float, t: float) -> Complex:
+    """Evaluate ``G(t; z)`` for unit density and kernel.
+
+    Parameters
+    ----------
+    z : ndarray of complex
+        Points, off the real axis or above the radius of convergence of the steady state.
+    lam : float
+        Shattering rate.
+    t : float
+        Time, above 0 and finite.
+
+    Returns
+    -------
+    ndarray of complex
+        Of the shape of `z`.
+    """
+    w, p = _solve(z, lam, t)
     return 2 * lam * p / w
 
 
@@ -138,10 +145,10 @@ def radius(lam: float, t: float) -> float:
         From below, to one part in 1e9.
     """
     steady = (1 + lam) ** 2 / (1 + 2 * lam)
-    # G is positive below its first pole and negative just above it
+    # The poles of G, zeros of w, lie at excesses of about 1 : 4 : 9 : ...; w is positive at first.
     excess = np.geomspace(1e-9, 4 * (1 + 2 / t) / steady, 400)
     while True:
-        value = generating_function((steady * (1 + excess)).astype(complex), lam, t).real
+        value = _solve((steady * (1 + excess)).astype(complex), lam, t)[0].real
         beyond = np.flatnonzero(~(value > 0))
         first = int(beyond[0]) if beyond.size else excess.size - 1
         if first == 0:

@@ -94,7 +94,7 @@ def _matrix(
     size = len(partitions(n))
     start, end, rate = _events(kernel, n, float(n if volume is None else volume), shattering)
     jumps = scipy.sparse.csc_array((rate, (end, start)), shape=(size, size))
-    total = np.bincount(start, rate, minlength=size)
+    total = np.bincount(start, rate, minlength=size).astype(float)
     return jumps, scipy.sparse.diags_array(total)
 
 
