@@ -1,0 +1,147 @@
+"""Checks of the arguments of `smolux.solve`, all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError, did_you_mean
+from ..model import Model
+from .operator import METHODS
+
+Float = NDArray[np.float64]
+
+GELS = ("inert", "reacts")
+_TOLERANCES = 1e-12, 0.1
+#: largest windows by default
+_LIMIT, _DIRECT_LIMIT = 1 << 20, 1 << 13
+#: where a gel forms, and where only other processes keep one from forming
+_GEL_LIMIT, _HINDERED_LIMIT = 1 << 12, 1 << 16
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What decides the outcome of `smolux.solve`, besides the model.
+
+    Attributes
+    ----------
+    fixed : bool
+        Whether the number of sizes stays at `limit`.
+    """
+
+    times: tuple[float, ...]
+    method: str
+    tolerance: float
+    limit: int
+    fixed: bool
+    orders: Float
+    sizes: int
+    bins_per_octave: int
+    gel: str
+
+
+def check(
+    model: Model,
+    times: ArrayLike,
+    method: str,
+    tolerance: float,
+    largest: int | None,
+    max_size: int | None,
+    orders: Sequence[float],
+    sizes: int,
+    bins_per_octave: int,
+    gel: str,
+) -> Settings:
+    """Return the arguments of `smolux.solve` as settings; parameters as there.
+
+    Raises
+    ------
+    InputError
+        With every mistake.
+    """
+    problems: list[str] = []
+    if not isinstance(model, Model):
+        problems.append(f"model = {model!r}: must be a smolux.Model(kernel=..., ...)")
+    for what, value, choices in (("method", method, METHODS), ("gel", gel, GELS)):
+        if value not in choices:
+            problems.append(f"{what} = {value!r}: unknown{did_you_mean(str(value), choices)}")
+    low, high = _TOLERANCES
+    if isinstance(tolerance, bool) or not (_is_number(tolerance) and low <= tolerance <= high):
+        problems.append(
+            f"tolerance = {tolerance!r}: must be a number from {low:g} to {high:g}; 1e-8 is usual"
+        )
+    for what, most in (("largest", largest), ("max_size", max_size)):
+        if most is not None:
+            _whole(what, most, 4, problems)
+    if largest is not None and max_size is not None and largest != max_size:
+        problems.append(
+            f"largest = {largest!r} and max_size = {max_size!r}: the first fixes the number of "
+            "sizes, the second limits its growth: give one of them"
+        )
+    counts = {
+        "sizes": _whole("sizes", sizes, 1, problems),
+        "bins_per_octave": _whole("bins_per_octave", bins_per_octave, 1, problems),
+    }
+    output = _times(times, problems)
+    powers = np.atleast_1d(np.asarray(orders, float))
+    if powers.ndim != 1 or not powers.size or not np.isfinite(powers).all():
+        problems.append(
+            f"orders = {orders!r}: must be a list of finite numbers, such as (0, 1, 2, 3)"
+        )
+    if gel == "reacts" and isinstance(model, Model):
+        others = [p.name for p in model.processes if p.name != "aggregation"]
+        if others:
+            problems.append(
+                f"gel = 'reacts': is for aggregation alone, not with {', '.join(others)}: "
+                "what a gel would leave then is not defined; use gel='inert'"
+            )
+    if problems:
+        raise InputError(problems)
+    limit = largest or max_size or _default_limit(model, method)
+    return Settings(
+        times=output,
+        method=method,
+        tolerance=float(tolerance),
+        limit=int(limit),
+        fixed=largest is not None,
+        orders=powers,
+        gel=gel,
+        **counts,
+    )
+
+
+def _default_limit(model: Model, method: str) -> int:
+    if model.kernel.gels:
+        return _GEL_LIMIT if len(model.processes) == 1 else _HINDERED_LIMIT
+    return _DIRECT_LIMIT if method == "direct" else _LIMIT
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float, np.number))
+
+
+def _whole(what: str, value: Any, least: int, problems: list[str]) -> int:
+    if not isinstance(value, bool) and _is_number(value) and value == value // 1 >= least:
+        return int(value)
+    problems.append(f"{what} = {value!r}: must be a whole number of at least {least}")
+    return least
+
+
+def _times(times: ArrayLike, problems: list[str]) -> tuple[float, ...]:
+    try:
+        output = np.atleast_1d(np.asarray(times, float))
+    except (TypeError, ValueError):
+        problems.append(f"times = {times!r}: must be a list of numbers")
+        return ()
+    if output.ndim != 1 or not output.size:
+        problems.append(f"times = {times!r}: must be a list of at least one number")
+    elif not (np.isfinite(output).all() and output[0] >= 0 and output[-1] > 0):
+        problems.append(f"times = {times!r}: must be finite, zero or more, and end above zero")
+    elif (np.diff(output) <= 0).any():
+        k = int(np.argmax(np.diff(output) <= 0))
+        problems.append(f"times: must ascend, but {output[k + 1]:g} follows {output[k]:g}")
+    return tuple(float(t) for t in output.ravel())

@@ -1,0 +1,118 @@
+"""From densities at the output times to records."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..records import Records
+
+Float = NDArray[np.float64]
+
+
+@dataclass
+class Snapshot:
+    """What is kept of the solution at an output time.
+
+    Attributes
+    ----------
+    window : int
+        The number of sizes M.
+    mass_error : float
+        Relative difference of the mass in the window from that at the start.
+    negative : float
+        The most negative density over the number density; zero if there is none.
+    """
+
+    n: Float
+    n_bin: Float
+    moment: Float
+    number_density: float
+    collisions: Float
+    window: int
+    mass_error: float
+    negative: float
+
+
+class Observer:
+    """Takes snapshots.
+
+    Parameters
+    ----------
+    orders : ndarray
+        Of the moments.
+    sizes, bins_per_octave : int
+        Densities size by size up to `sizes`, in bins above.
+    mass : float
+        Mass per unit volume of the whole system.
+    """
+
+    def __init__(self, orders: Float, sizes: int, bins_per_octave: int, mass: float) -> None:
+        self.orders, self.sizes, self.mass = orders, sizes, mass
+        first = sizes + 1
+        steps = np.arange(int((62 - np.log2(first)) * bins_per_octave) + 1)
+        #: the same bins as those of `smolux.simulate`
+        self.edges = np.unique([int(first * 2.0 ** (k / bins_per_octave)) for k in steps])
+
+    def __call__(self, n: Float, collisions: Float) -> Snapshot:
+        """Take a snapshot; densities below zero, which are rounding noise, are set to zero."""
+        total = float(n.sum())
+        negative = float(min(n.min(), 0.0)) / total if total > 0 else 0.0
+        n = np.maximum(n, 0.0)
+        k = np.arange(1.0, len(n) + 1.0)
+        exact = np.zeros(self.sizes)
+        exact[: min(self.sizes, len(n))] = n[: self.sizes]
+        used = int(np.searchsorted(self.edges, len(n), side="right"))
+        bins = np.add.reduceat(n, self.edges[:used] - 1) if used else np.empty(0)
+        return Snapshot(
+            n=exact,
+            n_bin=bins,
+            moment=np.array([float(n @ k**p) for p in self.orders]),
+            number_density=total,
+            collisions=collisions.copy(),
+            window=len(n),
+            mass_error=float(n @ k) / self.mass - 1.0,
+            negative=negative,
+        )
+
+    def records(
+        self, times: Sequence[float], processes: Sequence[str], shots: Sequence[Snapshot]
+    ) -> Records:
+        """Return records of one replica; times without a snapshot are NaN."""
+        count = len(times)
+        bins = max((len(s.n_bin) for s in shots), default=0)
+
+        def filled(*shape: int) -> Float:
+            return np.full((1, count, *shape), np.nan)
+
+        records = Records(
+            times=np.array(times),
+            orders=self.orders,
+            processes=tuple(processes),
+            bin_edges=np.append(self.edges.astype(float), 2.0**62)[: bins + 1],
+            number_density=filled(),
+            largest=filled(),
+            particles=filled(),
+            collisions=filled(),
+            volume=np.ones((1, count)),
+            moment=filled(len(self.orders)),
+            n=filled(self.sizes),
+            n_bin=filled(bins),
+            events=filled(len(processes)),
+            extinction_time=np.full(1, np.nan),
+        )
+        records.volume[0, len(shots) :] = np.nan
+        for t, shot in enumerate(shots):
+            records.number_density[0, t] = shot.number_density
+            records.collisions[0, t] = shot.collisions.sum()
+            records.events[0, t] = shot.collisions
+            records.moment[0, t] = shot.moment
+            records.n[0, t] = shot.n
+            records.n_bin[0, t] = 0.0
+            records.n_bin[0, t, : len(shot.n_bin)] = shot.n_bin
+        records.attributes["mass_error"] = [s.mass_error for s in shots]
+        records.attributes["window"] = [s.window for s in shots]
+        return records

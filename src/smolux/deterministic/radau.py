@@ -1,0 +1,192 @@
+"""Radau IIA steps of order seven with an iteration that needs only a banded triangular solve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+from scipy.linalg import lapack
+
+Float = NDArray[np.float64]
+
+STAGES = 4
+_MAX_ITERATIONS = 10
+#: the iteration error may be this share of the tolerance
+_ITERATION_SHARE = 0.05
+#: contraction above which a step is given up
+_SLOW = 0.8
+
+
+class Rates(Protocol):
+    """The equations ``dn/dt = f(t, n)`` with quantities that are only integrated along."""
+
+    def rates(self, times: Float, n: Float) -> tuple[Float, Float]:
+        """Return f of shape (S, M) and rates of what is integrated along, shape (S, Q)."""
+
+    def jacobian(self, t: float, n: Float, h: float) -> tuple[Float, Float]:
+        """Return the stiff part of the Jacobian: minus its diagonal, and J bands below, (M, J)."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step that was solved for.
+
+    Attributes
+    ----------
+    change : ndarray of shape (S, M)
+        ``n(t + c_i h) - n(t)`` at the stages; the last is the end of the step.
+    error : ndarray of shape (M,)
+        Estimate of the local error, of lower order than the step.
+    rates : ndarray of shape (S, M)
+    along : ndarray of shape (Q,)
+        Increase of what is integrated along.
+    iterations : int
+    contraction : float
+        The largest ratio of two changes in the iteration.
+    """
+
+    change: Float
+    error: Float
+    rates: Float
+    along: Float
+    iterations: int
+    contraction: float
+
+
+class _Tableau:
+    """Nodes, coefficients and their eigenvectors, for any number of stages."""
+
+    def __init__(self, stages: int) -> None:
+        polynomial = np.zeros(stages + 1)
+        polynomial[[stages - 1, stages]] = -1.0, 1.0
+        self.nodes = 0.5 * (np.sort(legendre.legroots(polynomial)) + 1.0)
+        self.nodes[-1] = 1.0
+        powers = np.vander(self.nodes, increasing=True)
+        order = np.arange(1, stages + 1)
+        integrals = self.nodes[:, None] ** order / order
+        self.matrix = integrals @ np.linalg.inv(powers)
+        values, vectors = np.linalg.eig(self.matrix)
+        # of a pair of conjugates one is enough
+        half = values.imag >= -1e-12
+        self.values, self.vectors = values[half], vectors[:, half]
+        self.inverse = np.linalg.inv(vectors)[half]
+        self.twice = np.where(np.abs(self.values.imag) > 1e-12, 2.0, 1.0)
+        #: the polynomial through the stages at the beginning of the step
+        self.at_start = np.linalg.solve(powers.T, np.eye(stages)[0])
+        self.embedded = float(np.abs(values).min())
+        self.through = np.linalg.inv(np.vander(np.append(0.0, self.nodes), increasing=True))
+
+
+TABLEAU = _Tableau(STAGES)
+#: order of the error estimate, and of the step
+ESTIMATE_ORDER, ORDER = STAGES + 1, 2 * STAGES
+
+
+def extrapolate(change: Float, ratio: float) -> Float:
+    """Continue the polynomial through the stages of a step to those of the next.
+
+    Parameters
+    ----------
+    change : ndarray of shape (S, M)
+        Of the previous step.
+    ratio : float
+        Length of the next step over that of the previous one.
+    """
+    powers = np.vander(1.0 + ratio * TABLEAU.nodes, STAGES + 1, increasing=True)
+    weights = (powers @ TABLEAU.through)[:, 1:]
+    return weights @ change - change[-1]
+
+
+def radau_step(
+    problem: Rates,
+    t: float,
+    n: Float,
+    h: float,
+    start: Float,
+    guess: Float,
+    norm: Callable[[Float, Float], float],
+    tolerance: float,
+) -> Step | None:
+    """Solve for one step of the collocation method Radau IIA with four stages.
+
+    The stages solve ``Z = h Q f(n + Z)``. The iteration ``Z <- Z + (1 - h Q x A)^{-1} r`` with the
+    residual r takes for A the bands that `Rates.jacobian` gives, so that the linear systems are
+    triangular and banded, one for each pair of conjugate eigenvalues of Q.
+
+    Parameters
+    ----------
+    problem : Rates
+    t, h : float
+        Beginning and length of the step.
+    n, start : ndarray of shape (M,)
+        Densities and their rates at t.
+    guess : ndarray of shape (S, M)
+        Where the iteration begins.
+    norm : callable
+        ``norm(error, n)`` relative to the densities.
+    tolerance : float
+        For the error of the step; a twentieth of it is allowed to the iteration.
+
+    Returns
+    -------
+    Step or None
+        None if the iteration does not converge.
+
+    References
+    ----------
+    E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 2nd ed. (Springer, 1996),
+    section IV.8, doi:10.1007/978-3-642-05221-7.
+    """
+    diagonal, band = problem.jacobian(t, n, h)
+    systems = [_Triangular(diagonal, band, h, value) for value in TABLEAU.values]
+    times = t + h * TABLEAU.nodes
+    change, previous, contraction = guess.copy(), np.inf, 0.0
+    for iteration in range(1, _MAX_ITERATIONS + 1):
+        rates, along = problem.rates(times, n + change)
+        residual = h * (TABLEAU.matrix @ rates) - change
+        correction = np.zeros_like(change)
+        for s, system in enumerate(systems):
+            part = system.solve(TABLEAU.inverse[s] @ residual)
+            correction += TABLEAU.twice[s] * np.outer(TABLEAU.vectors[:, s], part).real
+        change += correction
+        size = max(norm(row, n) for row in correction)
+        if not np.isfinite(size):
+            return None
+        ratio = size / previous if np.isfinite(previous) and previous > 0 else 0.0
+        contraction = max(contraction, ratio)
+        if ratio >= _SLOW:
+            return None
+        # without a ratio yet, a tenth is assumed
+        ahead = ratio / (1.0 - ratio) if iteration > 1 else 10.0
+        if ahead * size <= _ITERATION_SHARE * tolerance:
+            break
+        previous = size
+    else:
+        return None
+    gamma = TABLEAU.embedded
+    defect = gamma * h * (start - TABLEAU.at_start @ rates)
+    error = _Triangular(diagonal, band, h, gamma).solve(defect).real
+    return Step(change, error, rates, h * (TABLEAU.matrix[-1] @ along), iteration, contraction)
+
+
+class _Triangular:
+    """``1 - h value A`` for the banded lower-triangular A."""
+
+    def __init__(self, diagonal: Float, band: Float, h: float, value: complex) -> None:
+        self._real = abs(np.imag(value)) < 1e-12
+        scale = h * (np.real(value) if self._real else value)
+        dtype = float if self._real else complex
+        matrix = np.empty((len(diagonal), band.shape[1] + 1), dtype)
+        matrix[:, 0] = 1.0 + scale * diagonal
+        np.multiply(band, -scale, out=matrix[:, 1:])
+        self._matrix = matrix.T
+        self._solve = lapack.dtbtrs if self._real else lapack.ztbtrs
+
+    def solve(self, right: NDArray[np.complex128] | Float) -> NDArray[np.complex128] | Float:
+        right = np.real(right) if self._real else right
+        solution, _ = self._solve(self._matrix, right[:, None], uplo="L")
+        return solution[:, 0]
