@@ -31,9 +31,9 @@ _TESTED = (
     "sigmas: difference of the means over replicas in standard errors (Welch), turned from "
     "Student's t into the normal deviate of the same probability; an exact solution or a solver "
     "counts as without error. p_value: the sum of the squares of sigmas over all entries "
-    "(variable, time, order, size or bin with at least 10 particles) against a scaled chi-square "
-    "with the mean and the variance that this sum has under the correlations seen between the "
-    "replicas (Box 1954). p_largest: the largest of sigmas by Bonferroni, which holds for any "
+    "(variable, time, order, size or bin with at least 10 particles) against a chi-square law with "
+    "the mean, variance and skewness that this sum has under the correlations seen between the "
+    "replicas (Imhof 1961). p_largest: the largest of sigmas by Bonferroni, which holds for any "
     "correlation. The results agree if both are above 0.001. A bias of order 1/N of a finite "
     "population is a difference too."
 )
@@ -186,12 +186,12 @@ def compare(first: xr.Dataset, second: xr.Dataset | Literal["exact"]) -> xr.Data
     result = xr.Dataset(parts)
     z = np.concatenate([v[~np.isnan(v)] for v in used.values()])
     largest, where = _largest(result, used)
-    p, f = joint_test(z, np.concatenate(rows, axis=1)) if z.size else (np.nan, np.nan)
+    p, chi_square, f = joint_test(z, np.concatenate(rows, axis=1)) if z.size else (np.nan,) * 3
     p_largest = min(1.0, float(2 * stats.norm.sf(largest)) * z.size) if z.size else np.nan
     agree = int(min(p, p_largest) > SIGNIFICANCE) if z.size else -1
     result.attrs = {
         "p_value": p,
-        "chi_square": f * float(np.mean(z**2)) if z.size else np.nan,
+        "chi_square": chi_square,
         "degrees_of_freedom": f,
         "largest_sigmas": largest if z.size else np.nan,
         "where": where,

@@ -122,14 +122,14 @@ def welch(error_a: ArrayLike, count_a: ArrayLike, error_b: ArrayLike, count_b: A
         return np.asarray((a + b) ** 2 / (part_a + part_b), float)
 
 
-def joint_test(z: Float, rows: Float) -> tuple[float, float]:
+def joint_test(z: Float, rows: Float) -> tuple[float, float, float]:
     """Test many correlated deviations at once.
 
-    The sum ``Q = sum z**2`` over m entries with correlation matrix C has, if nothing differs, the
-    mean ``m`` and the variance ``2 tr C**2``. A scaled chi-square of the same mean and variance
-    has ``f = m**2 / tr C**2`` degrees of freedom, so ``f Q / m`` is compared with it. C is
-    estimated from the scatter of the replicas. A small sample makes ``tr C**2`` too large and the
-    test careful, not bold; ``f`` cannot exceed the degrees of freedom that the replicas have.
+    If nothing differs, the sum ``Q = sum z**2`` over entries with correlation matrix C has the
+    cumulants ``tr C``, ``2 tr C**2``, ``8 tr C**3``. It is compared with the chi-square law shifted
+    and stretched to the same three. C is estimated from the scatter of the replicas, which for a
+    small sample makes its powers too large and the test careful. In trials, equal laws are rejected
+    no more often than they should be at p = 0.05, and at most three times as often at p = 0.001.
 
     Parameters
     ----------
@@ -141,14 +141,18 @@ def joint_test(z: Float, rows: Float) -> tuple[float, float]:
 
     Returns
     -------
-    p, f : float
-        Probability of a larger Q, and the effective degrees of freedom.
+    p, x, f : float
+        Probability of a larger Q; the chi-square that stands for it and its degrees of freedom, at
+        most those that the replicas have.
 
     References
     ----------
-    G. E. P. Box, Ann. Math. Stat. 25, 290 (1954), doi:10.1214/aoms/1177728786, theorem 3.1.
+    J. P. Imhof, Biometrika 48, 419 (1961), doi:10.1093/biomet/48.3-4.419, section 4 (Pearson's
+    three-moment approximation).
     """
-    m = len(z)
-    # the Gram matrix of the replicas has the same trace of the square as C, and is small
-    f = m**2 / float(np.clip(np.sum((rows @ rows.T) ** 2), m, m**2))
-    return float(stats.chi2.sf(f * float(np.sum(z**2)) / m, f)), f
+    # the Gram matrix of the replicas has the eigenvalues of C, and is small
+    eigenvalues = np.linalg.eigvalsh(rows @ rows.T)
+    squares, cubes = float(np.sum(eigenvalues**2)), float(np.sum(eigenvalues**3))
+    f = squares**3 / cubes**2
+    x = (float(np.sum(z**2)) - len(z)) * np.sqrt(f / squares) + f
+    return float(stats.chi2.sf(x, f)), x, f

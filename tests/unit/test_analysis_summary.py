@@ -1,0 +1,229 @@
+"""Summaries and comparisons: honest intervals, and differences that are found."""
+
+import numpy as np
+import pytest
+import synthetic
+
+import smolux as sx
+from smolux import analysis
+from smolux.records import Records
+from smolux.results import to_dataset
+
+
+def repeated(replicas, columns=2000, seed=5):
+    """Dataset whose times are independent repeats of one Gaussian experiment about the truth."""
+    rng = np.random.default_rng(seed)
+    times = np.linspace(1.0, 3.0, columns)
+    noise = rng.standard_normal((replicas, columns))
+    moment = np.ones((replicas, columns, 4))
+    moment[..., 2] = (1 + times) * (1 - 0.05 * noise)
+    ones, none = np.ones((replicas, columns)), np.empty((replicas, columns, 0))
+    records = Records(
+        times=times,
+        orders=np.arange(4.0),
+        processes=(),
+        bin_edges=np.array([1.0]),
+        number_density=2 / (times + 2) * (1 + 0.01 * noise),
+        largest=ones,
+        particles=ones,
+        collisions=ones,
+        volume=ones,
+        moment=moment,
+        n=none,
+        n_bin=none,
+        events=none,
+        extinction_time=np.full(replicas, np.nan),
+    )
+    return to_dataset(synthetic.model(), records)
+
+
+@pytest.mark.parametrize("replicas", [2, 3, 8, 30])
+def test_intervals_cover_the_truth_95_times_in_100(replicas):
+    summary = sx.summary(repeated(replicas), sizes=())
+    # 2000 repeats: the standard deviation of the share is 0.5 %
+    for table in (summary["number_density"], summary["moment"].sel(order=2)):
+        inside = (table.sel(statistic="lower") <= table.sel(statistic="exact")) & (
+            table.sel(statistic="exact") <= table.sel(statistic="upper")
+        )
+        assert abs(float(inside.mean()) - 0.95) < 0.018
+        usual = np.abs(table.sel(statistic="sigmas")) < 1.959964
+        assert float(usual.mean()) == pytest.approx(float(inside.mean()), abs=1e-9)
+
+
+def test_exact_values_and_deviations():
+    ds = synthetic.constant_dataset()
+    summary = sx.summary(ds, sizes=(1, 3, 1000))
+    times = ds["time"].values
+    density = summary["number_density"]
+    assert np.allclose(density.sel(statistic="exact"), 2 / (times + 2))
+    assert np.allclose(density.sel(statistic="mean"), ds["number_density"].mean("replica"))
+    assert np.allclose(
+        summary["moment"].sel(order=3, statistic="exact"), 1 + 3 * times + 1.5 * times**2
+    )
+    assert summary["size"].values.tolist() == [1, 3]
+    sigmas = density.sel(statistic="sigmas").values[1:]
+    assert 0 < np.abs(sigmas).max() < 4
+    # conserved mass and the start: no spread, no difference
+    assert np.all(summary["moment"].sel(order=1, statistic="sigmas") == 0)
+    assert density.sel(statistic="sigmas").values[0] == 0
+    assert "1/N" in summary.attrs["notes"]
+
+
+def test_one_replica_has_no_interval():
+    summary = sx.summary(synthetic.constant_dataset(replicas=1))
+    for name in ("standard_error", "lower", "upper"):
+        assert np.isnan(summary["number_density"].sel(statistic=name)).all()
+    assert np.isnan(summary["number_density"].sel(statistic="sigmas")).all()
+    assert np.isfinite(summary["number_density"].sel(statistic="mean")).all()
+    assert "One replica" in summary.attrs["notes"]
+
+
+def test_nothing_seen_is_no_proof_of_nothing():
+    summary = sx.summary(synthetic.constant_dataset(particles=200), sizes=(50,))
+    table = summary["n"].sel(size=50, time=0.5)
+    assert float(table.sel(statistic="mean")) == 0
+    assert float(table.sel(statistic="exact")) > 0
+    assert np.isnan(table.sel(statistic=["lower", "upper", "sigmas"])).all()
+
+
+def test_replicas_that_did_not_reach_the_end():
+    ds = synthetic.constant_dataset()
+    for name in ("number_density", "moment", "n"):
+        ds[name][2:, 4] = np.nan
+        ds[name][:, 5] = np.nan
+    summary = sx.summary(ds)
+    counts = summary["number_density"].sel(statistic="replicas").values
+    assert counts.tolist() == [8, 8, 8, 8, 2, 0]
+    assert np.isnan(summary["number_density"].sel(statistic="mean").values[5])
+    assert "from t = 5 on" in summary.attrs["notes"]
+
+
+def test_extinct_replicas_stay_in_the_mean():
+    ds = synthetic.constant_dataset(particles=20, times=(1.0, 1e4))
+    assert np.isfinite(ds["extinction_time"]).all()
+    summary = sx.summary(ds)
+    assert float(summary["number_density"].sel(time=1e4, statistic="mean")) == 1 / 20
+    assert "In 8 of 8 replicas everything became one cluster" in summary.attrs["notes"]
+
+
+def test_a_solver_has_no_scatter():
+    summary = sx.summary(synthetic.solver_dataset())
+    assert np.isnan(summary["moment"].sel(statistic="standard_error")).all()
+    assert np.allclose(
+        summary["n"].sel(statistic="mean"), summary["n"].sel(statistic="exact"), rtol=1e-12
+    )
+    assert "relative difference" in analysis.format_table(summary)
+
+
+def test_unknown_exact_solution():
+    model = sx.Model(kernel=sx.kernels.Ballistic())
+    ds = to_dataset(model, synthetic.constant_kernel())
+    summary = sx.summary(ds)
+    assert np.isnan(summary["moment"].sel(statistic="exact")).all()
+    assert "No exact solution" in summary.attrs["notes"]
+    with pytest.raises(sx.InputError, match="no exact solution"):
+        analysis.compare(ds, "exact")
+
+
+def test_summary_of_something_else():
+    with pytest.raises(sx.InputError, match="no result"):
+        sx.summary(synthetic.constant_dataset().drop_vars("moment"))
+
+
+def test_table_of_text():
+    summary = sx.summary(synthetic.constant_dataset(), sizes=(1,))
+    text = analysis.format_table(summary, ["number_density", "moment"])
+    lines = text.splitlines()
+    assert lines[1].split() == ["time", "mean", "95", "%", "exact", "sigmas"]
+    assert lines[3].split()[0] == "0.5"
+    assert lines[3].split()[2].startswith("±")
+    assert lines[3].split()[3] == "0.8"
+    assert "moment M2" in text
+    assert "moment M0" not in text
+    assert len({len(line) for line in lines[1:8]}) == 1
+    with pytest.raises(sx.InputError, match="did you mean 'moment'"):
+        analysis.format_table(summary, ["momnt"])
+    with pytest.raises(sx.InputError, match=r"summary\(ds\) first"):
+        analysis.format_table(synthetic.constant_dataset())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_equal_laws_agree(seed):
+    ds = synthetic.constant_dataset(seed=100 + seed)
+    for other in (synthetic.constant_dataset(seed=200 + seed), synthetic.solver_dataset(), "exact"):
+        found = analysis.compare(ds, other)
+        assert found.attrs["agree"] == 1, found.attrs
+        assert found.attrs["entries"] > 20
+        assert found.attrs["largest_sigmas"] < 5
+
+
+def test_p_values_of_equal_laws_are_not_all_alike():
+    p = [
+        analysis.compare(
+            synthetic.constant_dataset(particles=300, seed=2 * k, replicas=4),
+            synthetic.constant_dataset(particles=300, seed=2 * k + 1, replicas=4),
+        ).attrs["p_value"]
+        for k in range(16)
+    ]
+    assert 0.3 < np.mean(p) < 0.65
+    assert np.std(p) > 0.1
+
+
+def test_a_shift_of_five_standard_errors_is_found():
+    ds = synthetic.constant_dataset(replicas=30)
+    shifted = ds.copy(deep=True)
+    error = ds["number_density"].std("replica", ddof=1) / np.sqrt(30)
+    shifted["number_density"] += 5 * error
+    found = analysis.compare(shifted, synthetic.solver_dataset())
+    assert found.attrs["agree"] == 0
+    assert found.attrs["p_largest"] < 1e-3
+    assert found.attrs["where"].startswith("number_density")
+    sigmas = found["number_density"].sel(statistic="sigmas").values[1:]
+    assert np.all(sigmas > 2)
+    # two simulations: the error of both counts
+    weak = analysis.compare(shifted, synthetic.constant_dataset(replicas=30, seed=9))
+    assert np.all(weak["number_density"].sel(statistic="error").values[1:] > 1.2 * error.values[1:])
+
+
+def test_lost_mass_is_found_without_any_spread():
+    ds = synthetic.constant_dataset()
+    ds["moment"].loc[{"order": 1.0, "time": 5.0}] = 0.98
+    found = analysis.compare(ds, synthetic.solver_dataset())
+    assert found.attrs["agree"] == 0
+    assert found.attrs["largest_sigmas"] == np.inf
+    assert found.attrs["where"] == "moment, time 5, order 1"
+    summary = sx.summary(ds)
+    assert float(summary["moment"].sel(order=1, time=5, statistic="sigmas")) == -np.inf
+
+
+def test_only_what_both_have_is_compared():
+    ds = synthetic.constant_dataset(times=(0.5, 1.0, 3.0))
+    found = analysis.compare(ds, synthetic.solver_dataset(times=(1.0 + 1e-12, 2.0, 3.0)))
+    assert found["time"].values.tolist() == [1, 3]
+    assert "n_bin" in found
+    with pytest.raises(sx.InputError, match="no output time in common"):
+        analysis.compare(ds, synthetic.solver_dataset(times=(7.0, 8.0)))
+
+
+def test_bins_with_other_edges_are_not_compared():
+    ds, other = synthetic.constant_dataset(), synthetic.constant_dataset(seed=2)
+    edge = other["bin_upper"].values.copy()
+    edge[0] += 1
+    other = other.assign_coords(bin_upper=("bin", edge))
+    assert analysis.compare(ds, other).sizes["bin"] == ds.sizes["bin"] - 1
+
+
+def test_single_replicas_cannot_be_compared():
+    one = synthetic.constant_dataset(replicas=1)
+    found = analysis.compare(one, synthetic.solver_dataset())
+    assert found.attrs["agree"] == -1
+    assert np.isnan(found.attrs["p_value"])
+    assert "two or more replicas" in found.attrs["notes"]
+    assert np.isfinite(found["moment"].sel(statistic="relative", order=2)).all()
+
+
+def test_results_that_stopped_are_compared_as_far_as_they_go():
+    ds = synthetic.constant_dataset(replicas=16)
+    for name in ("number_density", "moment", "n", "n_bin"):
+        ds[name][10:, 3:] = np.nan
+    assert analysis.compare(ds, "exact").attrs["agree"] == 1
