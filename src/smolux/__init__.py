@@ -1,7 +1,7 @@
 """smolux: exact Monte Carlo and deterministic solvers for aggregation and fragmentation.
 
-One description of the physics (`Model`), many ways to compute it (`simulate`, `solve`), one shape of
-result (an `xarray.Dataset`).
+One description of the physics (`Model`), many ways to compute it (`simulate`, `solve`), one shape
+of result (an `xarray.Dataset`).
 """
 
 from __future__ import annotations
@@ -38,7 +38,27 @@ _LAZY = {
 }
 _MODULES = {"plot"}
 
-__all__ = ["__version__", *sorted(_LAZY)]
+__all__ = [
+    "InputError",
+    "Interrupted",
+    "Model",
+    "SmoluxWarning",
+    "__version__",
+    "analysis",
+    "exact",
+    "initial",
+    "kernels",
+    "methods",
+    "plot",
+    "plotting",
+    "processes",
+    "results",
+    "resume",
+    "simulate",
+    "solve",
+    "summary",
+    "weighting",
+]
 
 if TYPE_CHECKING:
     from . import (

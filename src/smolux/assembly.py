@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,7 +28,7 @@ def _as_float(rate: Callable[..., Any]) -> Any:
     inner = user_piece(rate)
 
     @piece
-    def value(i, j, *p):  # type: ignore[no-untyped-def]
+    def value(i, j, *p):
         return float(inner(i, j, *p))
 
     return value
@@ -39,14 +40,14 @@ def _outcomes(functions: Sequence[Callable[..., Any]]) -> Any:
     if len(functions) == 1:
 
         @piece
-        def last(r, i, j, sizes, counts):  # type: ignore[no-untyped-def]
+        def last(r, i, j, sizes, counts):
             return first(i, j, sizes, counts)
 
         return last
     others = _outcomes(functions[1:])
 
     @piece
-    def outcome(r, i, j, sizes, counts):  # type: ignore[no-untyped-def]
+    def outcome(r, i, j, sizes, counts):
         if r == 0:
             return first(i, j, sizes, counts)
         return others(r - 1, i, j, sizes, counts)
@@ -60,14 +61,14 @@ def _factors(functions: Sequence[Callable[..., Any]]) -> Any:
     if len(functions) == 1:
 
         @piece
-        def last(r, t, q):  # type: ignore[no-untyped-def]
+        def last(r, t, q):
             return float(first(t, *q[0]))
 
         return last
     others = _factors(functions[1:])
 
     @piece
-    def factor(r, t, q):  # type: ignore[no-untyped-def]
+    def factor(r, t, q):
         if r == 0:
             return float(first(t, *q[0]))
         return others(r - 1, t, q[1:])
@@ -112,7 +113,7 @@ def _edges(end: float) -> list[float]:
 @lru_cache(maxsize=32)
 def _bounds(factor: TimeFunction, end: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     edges = _edges(end)
-    pairs = [factor.bounds(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    pairs = [factor.bounds(a, b) for a, b in pairwise(edges)]
     return tuple(edges), tuple(upper for _, upper in pairs)
 
 
@@ -151,14 +152,15 @@ def _check_factors(
         if wrong.any():
             t = float(times[wrong.argmax()])
             problems.append(
-                f"the rate of {process.name}, {process.factor.text}, is {values[wrong][0]:.6g} at t = {t:.6g}, "
-                f"before the end at {end:g}; it must not be negative: end earlier, or cut it off with max(0, ...)"
+                f"the rate of {process.name}, {process.factor.text}, is {values[wrong][0]:.6g} "
+                f"at t = {t:.6g}, before the end at {end:g}; it must not be negative: end earlier, "
+                "or cut it off with max(0, ...)"
             )
         elif not np.isfinite(bounds[:, k]).all():
             t = edges[int(np.argmin(np.isfinite(bounds[:, k])))]
             problems.append(
-                f"the rate of {process.name}, {process.factor.text}, has no finite bound near t = {t:.6g}; "
-                "it must stay finite up to the end"
+                f"the rate of {process.name}, {process.factor.text}, has no finite bound near "
+                f"t = {t:.6g}; it must stay finite up to the end"
             )
     if problems:
         raise InputError(problems)

@@ -17,7 +17,8 @@ from .files import replacing
 from .methods import METHODS
 from .model import Model
 from .model_dict import model_from_dict, model_to_dict
-from .replicas import Group, Plan
+from .plan import Plan
+from .replicas import Group
 from .weighting import WEIGHTINGS
 
 #: raised whenever the content of a checkpoint changes
@@ -100,8 +101,8 @@ def load(path: str | Path, model: Model | None = None) -> tuple[Plan, list[Group
     ----------
     path : str or path
     model : Model, optional
-        Needed if the kernel or a rate is a Python function, which a file cannot hold; it must be the
-        model of the interrupted run.
+        Needed if the kernel or a rate is a Python function, which a file cannot hold; it must be
+        the model of the interrupted run.
 
     Raises
     ------
@@ -118,8 +119,8 @@ def load(path: str | Path, model: Model | None = None) -> tuple[Plan, list[Group
         raise InputError(f"checkpoint = {str(path)!r}: cannot be read ({error})") from error
     if meta["version"] != VERSION:
         raise InputError(
-            f"checkpoint = {str(path)!r}: has version {meta['version']}, this smolux reads {VERSION}; "
-            "go on with the smolux that wrote it"
+            f"checkpoint = {str(path)!r}: has version {meta['version']}, this smolux reads "
+            f"{VERSION}; go on with the smolux that wrote it"
         )
     if model is not None and model_to_dict(model) != meta["plan"]["model"]:
         raise InputError(f"model: is not the one of the checkpoint {str(path)!r}")

@@ -51,7 +51,7 @@ class Initial:
         raise NotImplementedError
 
     def densities(self, largest: int) -> Float:
-        """Number densities of the sizes ``1 .. largest``."""
+        """Return number densities of the sizes ``1 .. largest``."""
         edges = self.cumulative(np.arange(0, largest + 1, dtype=float))
         return self.total * np.diff(edges)
 
@@ -163,7 +163,7 @@ class Sizes(Initial):
 
 @dataclass(frozen=True)
 class Exponential(Initial):
-    """Geometric law ``n_k ~ exp(-k / c)`` on the whole sizes, of a given mean; see `exponential`."""
+    """Geometric law ``n_k ~ exp(-k / c)`` on the whole sizes; see `exponential`."""
 
     mean: float
     density: float = 1.0
@@ -298,5 +298,5 @@ def lognormal(median: float, sigma: float, density: float = 1.0) -> Lognormal:
     return Lognormal(float(median), float(sigma), float(density))
 
 
-#: every initial condition; the name in a case file is its ``name``, "monodisperse" being short for one size
+#: every initial condition; case files know it by its ``name``, and one size as "monodisperse"
 INITIALS: tuple[type[Initial], ...] = (Sizes, Exponential, Lognormal)

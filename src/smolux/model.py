@@ -48,14 +48,20 @@ class Model:
         )
         object.__setattr__(self, "processes", processes)
         if not processes:
-            problems.append("processes = []: at least one is needed, such as smolux.processes.Aggregation()")
+            problems.append(
+                "processes = []: at least one is needed, such as smolux.processes.Aggregation()"
+            )
         problems += [
             f"process {p!r}: must be an instance such as smolux.processes.Shattering(0.01)"
             for p in processes
             if not isinstance(p, PairProcess)
         ]
         names = [p.name for p in processes if isinstance(p, PairProcess)]
-        problems += [f"process {n!r} is given {names.count(n)} times: give it once" for n in set(names) if names.count(n) > 1]
+        problems += [
+            f"process {n!r} is given {names.count(n)} times: give it once"
+            for n in set(names)
+            if names.count(n) > 1
+        ]
         if not isinstance(self.initial, Initial):
             problems.append(
                 f"initial = {self.initial!r}: must be an initial condition such as "

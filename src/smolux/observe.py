@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from .core.state import DOUBLINGS, EXTINCT
+from .plan import Plan
 from .records import Records
-from .replicas import Group, Plan
+from .replicas import Group
 
 
 def to_records(plan: Plan, groups: Sequence[Group]) -> Records:

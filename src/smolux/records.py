@@ -1,4 +1,4 @@
-"""What a computation leaves behind at its output times: plain arrays, the same from every method."""
+"""What a computation leaves behind at its output times: plain arrays, whatever the method."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ class Records:
     n : ndarray of shape (R, T, L)
         Number densities of the sizes ``1 .. L``.
     n_bin : ndarray of shape (R, T, B)
-        Number densities summed over the sizes ``bin_edges[b] <= k < bin_edges[b + 1]``, all above L.
+        Number densities summed over the sizes ``bin_edges[b] <= k < bin_edges[b + 1]``, all above
+        L.
     events : ndarray of shape (R, T, P)
         Collisions so far that ended in each of `processes`.
     extinction_time : ndarray of shape (R,)

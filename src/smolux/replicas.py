@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -35,7 +34,6 @@ from .core.state import (
     WINDOW,
     WORST_I,
     WORST_J,
-    Grid,
     State,
     Tally,
     new_state,
@@ -43,51 +41,13 @@ from .core.state import (
 )
 from .errors import InputError
 from .initial import Sizes
-from .methods.base import Method
 from .model import Model
-from .weighting.base import Weighting
+from .plan import Plan
 
 Int = NDArray[np.int64]
 
 #: seconds between returns to Python
 _SLICE = 0.1
-
-
-@dataclass(frozen=True)
-class Plan:
-    """All that decides the outcome of a stochastic run."""
-
-    model: Model
-    times: tuple[float, ...]
-    method: Method
-    weighting: Weighting
-    population: str
-    particles: int
-    replicas: int
-    entropy: int
-    orders: tuple[float, ...]
-    sizes: int
-    bins_per_octave: int
-    distribution: bool
-
-    @property
-    def volume(self) -> float:
-        """Volume simulated at the start."""
-        return self.particles / self.model.initial.total
-
-    @cached_property
-    def grid(self) -> Grid:
-        """Output times, bin edges above the exact sizes, orders of moments."""
-        first = self.sizes + 1
-        steps = np.arange(int((62 - np.log2(first)) * self.bins_per_octave) + 1)
-        edges = np.unique([int(first * 2.0 ** (k / self.bins_per_octave)) for k in steps])
-        return Grid(np.array(self.times), edges.astype(np.int64), np.array(self.orders))
-
-    def groups(self, workers: int) -> list[tuple[int, int]]:
-        """Split the replicas: first and number of each group."""
-        together = max(1, 200_000 // self.particles)
-        each = max(1, min(together, -(-self.replicas // max(workers, 1))))
-        return [(r, min(each, self.replicas - r)) for r in range(0, self.replicas, each)]
 
 
 @dataclass
@@ -193,7 +153,7 @@ class Group:
         waiting = np.flatnonzero(
             (self.codes != DONE) & (self.codes != BUDGET) & (self.codes != GROW)
         )
-        for r in waiting:
+        for r in map(int, waiting):
             code = self.codes[r]
             if code == BOUND:
                 rates = rates_for(self.plan.model, self.plan.weighting)
@@ -215,8 +175,8 @@ class Group:
         )
         if not (np.isfinite(value) and value >= 0):
             raise InputError(
-                f"the rate of {name}, {text}, is {value:.6g} near t = {self.state.clock[r, TIME]:.6g}; "
-                "it must be a finite number, zero or more"
+                f"the rate of {name}, {text}, is {value:.6g} near "
+                f"t = {self.state.clock[r, TIME]:.6g}; it must be a finite number, zero or more"
             )
         self.windows.bounds[window, process] = max(
             1.1 * value, self.windows.bounds[window, process]
@@ -224,7 +184,8 @@ class Group:
         self.windows.total[:] = self.windows.bounds.sum(axis=1)
         self.warnings.append(
             f"the rate of {name}, {text}, was found above its sampled bound near "
-            f"t = {self.state.clock[r, TIME]:.6g}; the bound was raised: a formula has proved bounds"
+            f"t = {self.state.clock[r, TIME]:.6g}; the bound was raised: a formula has proved "
+            "bounds"
         )
 
     def findings(self) -> list[str]:
@@ -235,9 +196,10 @@ class Group:
             worst = int(np.argmax(self.state.clock[:, FLOOR]))
             i, j = count[worst, WORST_I], count[worst, WORST_J]
             found.append(
-                f"the kernel was found above its sampled bound {count[:, REPAIRS].sum()} times in "
-                f"{count[:, TRIALS].sum()} candidates, last at sizes ({i}, {j}); the bound was raised from there "
-                "on. Give bounds= to from_function, or write the kernel as a formula, to have proved bounds"
+                f"the kernel was found above its bound {count[:, REPAIRS].sum()} times in "
+                f"{count[:, TRIALS].sum()} candidates, last at sizes ({i}, {j}); the bound was "
+                "raised from there on. A kernel written as a formula, or bounds= of from_function "
+                "that hold, have no such error"
             )
         return found
 
@@ -253,7 +215,7 @@ def _population(plan: Plan, replica: int) -> tuple[Int, Int]:
 def _bad_rate(model: Model, state: State, r: int) -> str:
     i, j = int(state.count[r, WORST_I]), int(state.count[r, WORST_J])
     return (
-        f"the kernel {model.kernel.name!r} gave {state.clock[r, VALUE]:.6g} for the sizes {i} and {j}, "
-        f"met at t = {state.clock[r, TIME]:.6g}; a rate must be a finite number, zero or more: "
-        "correct the function for these sizes"
+        f"the kernel {model.kernel.name!r} gave {state.clock[r, VALUE]:.6g} for the sizes "
+        f"{i} and {j}, met at t = {state.clock[r, TIME]:.6g}; a rate must be a finite number, "
+        "zero or more: correct the function for these sizes"
     )

@@ -9,27 +9,24 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checkpoint as checkpoints
-from .errors import InputError, Interrupted, did_you_mean
-from .methods import METHODS
+from .errors import Interrupted
 from .methods.base import Method
 from .model import Model
 from .observe import to_records
-from .replicas import Group, Plan
+from .plan import Plan, make_plan
+from .replicas import Group
 from .results import to_dataset
-from .weighting import WEIGHTINGS
 from .weighting.base import Weighting
 
 if TYPE_CHECKING:
     import xarray as xr
 
-#: policies for a falling number of particles
-POPULATIONS = ("doubling", "fixed-volume")
 _TICK = 0.2
 
 
@@ -90,14 +87,15 @@ def simulate(
     weighting : str or Weighting
         What one simulated particle stands for, see `smolux.weighting.WEIGHTINGS`.
     population : {"doubling", "fixed-volume"}
-        Double the volume, every particle once more, when half of the initial number are left; or do not.
+        Double the volume, every particle once more, when half of the initial number are left; or
+        do not.
     particles : int
         Simulated particles at the start; the volume is ``particles / density``.
     replicas : int
         Independent runs; error bars come from the spread over them.
     seed : int, optional
-        Entropy of the random streams, one for each replica; drawn and stored if left out. The same seed gives
-        the same numbers on any number of threads.
+        Entropy of the random streams, one for each replica; drawn and stored if left out. The
+        same seed gives the same numbers on any number of threads.
     orders : sequence of float
         Orders p of the moments ``M_p = sum_k k**p n_k``.
     sizes : int
@@ -107,13 +105,13 @@ def simulate(
     distribution : bool
         Keep the whole population at each time.
     executor : concurrent.futures.Executor, optional
-        Where groups of replicas run; threads of this process if left out. Other executors than threads
-        run without progress and checkpoints.
+        Where groups of replicas run; threads of this process if left out. Other executors than
+        threads run without progress and checkpoints.
     progress : callable, optional
         Called with a `Progress` a few times a second.
     checkpoint : path, optional
-        File for checkpoints, written every `checkpoint_every` seconds and when the run is stopped. Removed at
-        the end.
+        File for checkpoints, written every `checkpoint_every` seconds and when the run is
+        stopped. Removed at the end.
     checkpoint_every : float
         Seconds between checkpoints.
     time_limit : float, optional
@@ -129,14 +127,14 @@ def simulate(
     InputError
         With every mistake in the arguments, or when the kernel gives no valid rate during the run.
     Interrupted
-        On Ctrl-C, or past the time limit; holds the dataset of what was reached, and the checkpoint from which
-        `resume` goes on, bit for bit.
+        On Ctrl-C, or past the time limit; holds the dataset of what was reached, and the
+        checkpoint from which `resume` goes on, bit for bit.
 
     Notes
     -----
-    Waiting times are exponential, so every distribution of the process is exact, fluctuations included. The mean
-    over replicas differs from the solution of the rate equations by ``O(1/particles)``; this bias is not part
-    of the spread.
+    Waiting times are exponential, so every distribution of the process is exact, fluctuations
+    included. The mean over replicas differs from the solution of the rate equations by
+    ``O(1/particles)``; this bias is not part of the spread.
 
     Examples
     --------
@@ -307,123 +305,3 @@ def _elsewhere(plan: Plan, executor: Executor) -> xr.Dataset:
     records = to_records(plan, [f.result() for f in futures])
     records.attributes["wall_seconds"] = time.perf_counter() - started
     return to_dataset(plan.model, records)
-
-
-def make_plan(
-    model: Model,
-    times: ArrayLike,
-    method: str | Method,
-    weighting: str | Weighting,
-    population: str,
-    particles: int,
-    replicas: int,
-    seed: int | None,
-    orders: Sequence[float],
-    sizes: int,
-    bins_per_octave: int,
-    distribution: bool,
-) -> Plan:
-    """Check the arguments of `simulate`, all at once; parameters as there.
-
-    Raises
-    ------
-    InputError
-        With every mistake.
-    """
-    problems: list[str] = []
-    if not isinstance(model, Model):
-        problems.append(f"model = {model!r}: must be a smolux.Model(kernel=..., ...)")
-    found = {
-        "method": _chosen("method", method, METHODS, Method, problems),
-        "weighting": _chosen("weighting", weighting, WEIGHTINGS, Weighting, problems),
-    }
-    if population not in POPULATIONS:
-        problems.append(
-            f"population = {population!r}: unknown{did_you_mean(str(population), POPULATIONS)}"
-        )
-    numbers = {
-        "particles": _whole("particles", particles, 2, problems),
-        "replicas": _whole("replicas", replicas, 1, problems),
-        "sizes": _whole("sizes", sizes, 1, problems),
-        "bins_per_octave": _whole("bins_per_octave", bins_per_octave, 1, problems),
-    }
-    entropy = (
-        np.random.SeedSequence().entropy if seed is None else _whole("seed", seed, 0, problems)
-    )
-    output = check_times(times, problems)
-    powers = np.atleast_1d(np.asarray(orders, float))
-    if powers.ndim != 1 or not powers.size or not np.isfinite(powers).all():
-        problems.append(
-            f"orders = {orders!r}: must be a list of finite numbers, such as (0, 1, 2, 3)"
-        )
-    if problems:
-        raise InputError(problems)
-    plan = Plan(
-        model=model,
-        times=output,
-        population=population,
-        entropy=int(entropy),  # type: ignore[arg-type]
-        orders=tuple(float(p) for p in powers),
-        distribution=bool(distribution),
-        **found,
-        **numbers,  # type: ignore[arg-type]
-    )
-    _check_memory(plan)
-    return plan
-
-
-def _chosen(what: str, value: Any, registry: Sequence[Any], kind: type, problems: list[str]) -> Any:
-    if isinstance(value, kind):
-        return value
-    names = {entry.name: entry for entry in registry}
-    if isinstance(value, str) and value in names:
-        return names[value]()
-    problems.append(f"{what} = {value!r}: unknown{did_you_mean(str(value), list(names))}")
-    return None
-
-
-def _whole(what: str, value: Any, least: int, problems: list[str]) -> int:
-    try:
-        whole = int(value)
-        if whole == value and whole >= least and not isinstance(value, bool):
-            return whole
-    except (TypeError, ValueError, OverflowError):
-        pass
-    problems.append(f"{what} = {value!r}: must be a whole number of at least {least}")
-    return least
-
-
-def check_times(times: ArrayLike, problems: list[str]) -> tuple[float, ...]:
-    """Return output times as floats; add what is wrong with them to `problems`."""
-    try:
-        output = np.atleast_1d(np.asarray(times, float))
-    except (TypeError, ValueError):
-        problems.append(f"times = {times!r}: must be a list of numbers")
-        return ()
-    if output.ndim != 1 or not output.size:
-        problems.append(f"times = {times!r}: must be a list of at least one number")
-    elif not (np.isfinite(output).all() and output[0] >= 0 and output[-1] > 0):
-        problems.append(f"times = {times!r}: must be finite, zero or more, and end above zero")
-    elif (np.diff(output) <= 0).any():
-        k = int(np.argmax(np.diff(output) <= 0))
-        problems.append(f"times: must ascend, but {output[k + 1]:g} follows {output[k]:g}")
-    return tuple(float(t) for t in output.ravel())
-
-
-def _check_memory(plan: Plan) -> None:
-    """Refuse a run whose arrays cannot fit, before anything is computed."""
-    try:
-        available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):  # not known on this system
-        return
-    grid = plan.grid
-    row = 8 * (plan.sizes + len(grid.edges) + len(grid.orders) + 8)
-    observations = plan.replicas * len(plan.times) * row
-    stores = plan.replicas * plan.method.bytes_per_replica(plan.particles)
-    if observations + stores > 0.9 * available:
-        raise InputError(
-            f"the run needs about {(observations + stores) / 1e9:.1f} GB ({stores / 1e9:.1f} GB of particles, "
-            f"{observations / 1e9:.1f} GB of observations) and this machine has {available / 1e9:.1f} GB: "
-            f"lower particles = {plan.particles}, replicas = {plan.replicas}, sizes = {plan.sizes} or the number "
-            "of times"
-        )

@@ -1,10 +1,10 @@
 """Compilation with a disk cache keyed on content.
 
 Numba's own cache never hits for functions made inside functions (numba issue 6264), as every loop
-here is, and answers with old code when only a callee was edited (numba issue 1833). This one keys an
-entry on everything that decides the machine code: bytecode, constants, defaults, closure cells and
-the globals reached, recursively through every function called. It hooks in where Numba's own does;
-should those private names be gone, compilation still works, only slower to start.
+here is, and answers with old code when only a callee was edited (numba issue 1833). This one keys
+an entry on everything that decides the machine code: bytecode, constants, defaults, closure cells
+and the globals reached, recursively through every function called. It hooks in where Numba's own
+does; should those private names be gone, compilation still works, only slower to start.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ statistics = {"hits": 0, "misses": 0}
 
 
 def cache_directory() -> Path | None:
-    """Where compiled code is kept: ``SMOLUX_CACHE_DIR``, else the user's cache folder; None if off."""
+    """Where compiled code is kept: ``SMOLUX_CACHE_DIR``, else the user's cache; None if off."""
     given = os.environ.get("SMOLUX_CACHE_DIR")
     if given is not None:
         return Path(given) if given else None
@@ -65,7 +65,10 @@ class _Digest:
 
     def add(self, value: Any) -> None:
         if isinstance(value, numba.core.dispatcher.Dispatcher):
-            self._text(f"dispatcher {sorted(value.targetoptions.items(), key=str)}")
+            self._text("dispatcher")
+            for name, option in sorted(value.targetoptions.items()):
+                self._text(name)
+                self.add(option)
             self._function(value.py_func)
         elif isinstance(value, types.FunctionType):
             self._function(value)
@@ -78,6 +81,8 @@ class _Digest:
         elif isinstance(value, np.ndarray):
             self._text(f"array {value.dtype} {value.shape}")
             self._hash.update(np.ascontiguousarray(value).tobytes())
+        elif isinstance(value, (set, frozenset)):  # their order differs between processes
+            self.add(sorted(value, key=repr))
         elif isinstance(value, (tuple, list)):
             self._text(f"{type(value).__name__} {len(value)}")
             for item in value:
@@ -223,7 +228,7 @@ def piece(fn: Callable[..., Any] | None = None, /, **options: Any) -> Any:
 
 
 def cold_piece(fn: Callable[..., Any]) -> Any:
-    """Compile a function that is called rarely, and not inlined: inlining it would only cost time."""
+    """Compile a function that is called rarely: inlining it would only cost time."""
     return piece(fn, forceinline=False)
 
 

@@ -1,12 +1,12 @@
 """The one event loop.
 
-A method brings seven `Pieces`, a model two; they are bound by closure and inlined. A piece that needs
-another one, or the rate, is made by a function that takes it: a compiled function passed as an argument
-could not be kept in the cache.
+A method brings seven `Pieces`, a model two; they are bound by closure and inlined. A piece that
+needs another one, or the rate, is made by a function that takes it: a compiled function passed as
+an argument could not be kept in the cache.
 
-The loop returns when every output time is recorded, when its budget is spent, or when it needs Python:
-a larger store, a bound of the kernel. The pending event is part of the state, so a trajectory
-depends neither on the output times nor on where the loop returned.
+The loop returns when every output time is recorded, when its budget is spent, or when it needs
+Python: a larger store, a bound of the kernel. The pending event is part of the state, so a
+trajectory depends neither on the output times nor on where the loop returned.
 """
 
 from __future__ import annotations
@@ -81,13 +81,13 @@ class Pieces(NamedTuple):
     view : ``view(work, r)``
         The work arrays of replica `r`.
     draw : ``draw(s, w, p, factor)``
-        Choose the next pair into ``count[FIRST]``, ``count[SECOND]`` (-1: nothing happens then) and return the
-        waiting time, the rate being `factor` times that of the kernel.
+        Choose the next pair into ``count[FIRST]``, ``count[SECOND]`` (-1: nothing happens then)
+        and return the waiting time, the rate being `factor` times that of the kernel.
     pair : ``pair(s, w)``
         Sizes of the chosen pair.
     update : ``update(s, w, entries, p)``
-        Take the pair out and put the `entries` of ``s.sizes``, ``s.counts`` in; False, with nothing changed, if
-        there is no room.
+        Take the pair out and put the `entries` of ``s.sizes``, ``s.counts`` in; False, with
+        nothing changed, if there is no room.
     prepare : ``prepare(s, w, p)``
         Bring bounds up to date; 0 or the reason to return.
     double : ``double(s, w)``
@@ -215,8 +215,8 @@ def make_loop(
     Returns
     -------
     callable
-        ``loop(state, work, tally, windows, grid, p, q, codes, budget)`` advances every replica whose
-        code is not `DONE` and writes why it returned into `codes`.
+        ``loop(state, work, tally, windows, grid, p, q, codes, budget)`` advances every replica
+        whose code is not `DONE` and writes why it returned into `codes`.
     """
     view, prepare, double = pieces.view, pieces.prepare, pieces.double
     next_event = make_next_event(pieces.draw)

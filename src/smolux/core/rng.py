@@ -22,7 +22,7 @@ _LAYER = np.uint64(255)
 
 
 def streams(entropy: int, first: int, count: int) -> np.ndarray:
-    """Seed the streams of replicas ``first .. first + count - 1``: uint64 array of shape (count, 4).
+    """Seed the streams of the replicas from `first` on: a uint64 array of shape (count, 4).
 
     The words are those of ``numpy.random.SeedSequence(entropy).spawn(...)[replica]``.
     """

@@ -67,7 +67,7 @@ class State(NamedTuple):
 
     rng: np.ndarray
     clock: np.ndarray
-    count: np.ndarray
+    count: np.ndarray  # type: ignore[assignment]
     events: np.ndarray
     sizes: np.ndarray
     counts: np.ndarray

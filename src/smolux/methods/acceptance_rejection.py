@@ -87,8 +87,8 @@ def _pair(s, w):
 def _look_ahead(s, w, k):
     """Draw the pair of a later candidate and ask for its memory.
 
-    The number of particles will have changed by a few when its turn comes, which leaves the place within the
-    same stretch of memory.
+    The number of particles will have changed by a few when its turn comes, which leaves the place
+    within the same stretch of memory.
     """
     for m in range(k, k + 2):
         w.ahead[m] = rng.uniform(s.rng)
@@ -98,14 +98,14 @@ def _look_ahead(s, w, k):
 
 def _make_draw(rate: Any) -> Any:
     @piece
-    def value_of(w, i, j, p):  # type: ignore[no-untyped-def]
+    def value_of(w, i, j, p):
         n = w.table.shape[0]
         if i <= n and j <= n:
             return w.table[i - 1, j - 1]
         return rate(float(i), float(j), *p)
 
     @piece
-    def draw(s, w, p, factor):  # type: ignore[no-untyped-def]
+    def draw(s, w, p, factor):
         n = s.count[PARTICLES]
         s.count[FIRST] = -1
         majorant = s.clock[MAJORANT]
@@ -234,8 +234,8 @@ def _visit(s, w, t, grid):
 class AcceptanceRejection(Method):
     """Draw pairs with equal chance; accept with probability ``K(i, j) / K_max``.
 
-    ``K_max`` bounds the kernel over the pairs of sizes present. The cost of an event is the inverse of the
-    mean acceptance; the monomers of a shattering event are only counted.
+    ``K_max`` bounds the kernel over the pairs of sizes present. The cost of an event is the
+    inverse of the mean acceptance; the monomers of a shattering event are only counted.
 
     References
     ----------
@@ -259,7 +259,7 @@ class AcceptanceRejection(Method):
     ) -> Work:
         """See `Method.new_work`."""
         stored = [int(counts[sizes > 1].sum()) for sizes, counts in populations]
-        # without growth: half of the monomers merge in pairs, or all particles once more when doubled
+        # enough without growth: half of the monomers merge in pairs
         capacity = max(
             max(m, int(counts.sum()) // 2)
             for m, (_, counts) in zip(stored, populations, strict=True)

@@ -45,8 +45,8 @@ class Rates:
 class Method:
     """A way to draw the next event of the jump process.
 
-    A method is a frozen dataclass of its settings. Its pieces, made by `bind`, are compiled; the rest
-    runs in Python.
+    A method is a frozen dataclass of its settings. Its pieces, made by `bind`, are compiled; the
+    rest runs in Python.
 
     Attributes
     ----------
@@ -71,7 +71,8 @@ class Method:
     ) -> Any:
         """Store the initial populations (sizes, counts), one a replica, and return the work arrays.
 
-        `mass` bounds the mass of every replica at its start, and is the same for all groups of replicas.
+        `mass` bounds the mass of every replica at its start, and is the same for all groups of
+        replicas.
         """
         raise NotImplementedError
 

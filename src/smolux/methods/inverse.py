@@ -1,4 +1,4 @@
-"""The inverse method (fast DSMC): first and second particle by cumulative sums, without rejection."""
+"""The inverse method (fast DSMC): both particles by cumulative sums, none rejected."""
 
 from __future__ import annotations
 
@@ -26,11 +26,10 @@ from ..core.state import (
     WORST_J,
     State,
 )
+from ..core.sums import BLOCK, find, find_large, shift, weigh
 from ..errors import InputError
 from .base import Int, Method, Rates, enlarged
 
-#: sums are kept for blocks of this many sizes: a search looks at blocks, then inside one
-_BLOCK = 32
 #: events after which the sums are computed afresh, so that rounding does not pile up
 _REFRESH = 1 << 16
 
@@ -45,7 +44,8 @@ class Work(NamedTuple):
     number : float64 array of shape (R, B)
         Particles in each bucket (whole numbers).
     rate : float64 array of shape (R, 1, B)
-        Rate ``S_k`` of one particle of the bucket with all others; kept up to size ``count[LARGEST]``.
+        Rate ``S_k`` of one particle of the bucket with all others; kept up to size
+        ``count[LARGEST]``.
     block : float64 array of shape (R, B / 32)
         Sums of ``number * rate`` over blocks.
     large : int64 array of shape (R, capacity)
@@ -61,9 +61,6 @@ class Work(NamedTuple):
     large: np.ndarray
     large_rate: np.ndarray
     table: np.ndarray
-
-
-_fast = {"fastmath": {"reassoc", "contract", "nsz"}, "forceinline": False}
 
 
 @piece
@@ -87,66 +84,15 @@ def _pair(s, w):
     return _size(w, s.count[FIRST]), _size(w, s.count[SECOND])
 
 
-@piece(**_fast)
-def _weigh(number, rates, row, block, top):
-    """Sums of ``number * rates[row]`` over blocks, and in all."""
-    total = 0.0
-    for b in range((top + _BLOCK - 1) // _BLOCK):
-        x = 0.0
-        for k in range(b * _BLOCK, min((b + 1) * _BLOCK, top)):
-            x += number[k] * rates[row, k]
-        block[b] = x
-        total += x
-    return total
-
-
-@piece(**_fast)
-def _shift(rate, table, i, j, gone, new, count, top):
-    """Account for one event in the rates of all sizes: one traversal of three rows."""
-    for k in range(top):
-        rate[k] += count * table[new, k] - gone * (table[i, k] + table[j, k])
-
-
-@piece
-def _find(number, rates, row, block, top, x):
-    """Find the size at which the cumulative sum of ``number * rates[row]`` passes `x`; -1 if rounding beat it."""
-    for b in range((top + _BLOCK - 1) // _BLOCK):
-        if x >= block[b]:
-            x -= block[b]
-            continue
-        last = -1
-        for k in range(b * _BLOCK, min((b + 1) * _BLOCK, top)):
-            weight = number[k] * rates[row, k]
-            if weight > 0.0:
-                last = k
-                if x < weight:
-                    return k
-                x -= weight
-        return last
-    return -1
-
-
-@piece
-def _find_large(weights, stored, x):
-    last = -1
-    for d in range(stored):
-        if weights[d] > 0.0:
-            last = d
-            if x < weights[d]:
-                return d
-            x -= weights[d]
-    return last
-
-
 @cold_piece
 def _first(s, w, small, x):
     """Slot of the first particle, by its rate with all others."""
     top, buckets = _top(s, w), w.table.shape[1]
     if x < small:
-        k = _find(w.number, w.rate, 0, w.block, top, x)
+        k = find(w.number, w.rate, 0, w.block, top, x)
         if k >= 0:
             return k
-    d = _find_large(w.large_rate, s.count[STORED], x - small)
+    d = find_large(w.large_rate, s.count[STORED], x - small)
     return buckets + d if d >= 0 else -1
 
 
@@ -192,7 +138,7 @@ def _visit(s, w, t, grid):
 
 def _make_rates(rate: Any) -> tuple[Any, Any, Any]:
     @piece
-    def pair_rate(s, w, i, j, p):  # type: ignore[no-untyped-def]
+    def pair_rate(s, w, i, j, p):
         if i <= w.table.shape[1] and j <= w.table.shape[1]:
             return w.table[i - 1, j - 1]
         value = rate(float(i), float(j), *p)
@@ -202,7 +148,7 @@ def _make_rates(rate: Any) -> tuple[Any, Any, Any]:
         return value
 
     @cold_piece
-    def row_of(s, w, scratch, size, top, p):  # type: ignore[no-untyped-def]
+    def row_of(s, w, scratch, size, top, p):
         """Row of the table with the rates of `size` with the sizes ``1 .. top``."""
         buckets = w.table.shape[1]
         if size <= buckets:
@@ -213,10 +159,10 @@ def _make_rates(rate: Any) -> tuple[Any, Any, Any]:
         return np.int64(row)
 
     @cold_piece
-    def own_rate(s, w, size, p):  # type: ignore[no-untyped-def]
+    def own_rate(s, w, size, p):
         """Rate of a particle of `size` that is present with all others."""
         top = _top(s, w)
-        total = _weigh(w.number, w.table, row_of(s, w, 0, size, top, p), w.block, top)
+        total = weigh(w.number, w.table, row_of(s, w, 0, size, top, p), w.block, top)
         for d in range(s.count[STORED]):
             total += pair_rate(s, w, size, w.large[d], p)
         return total - pair_rate(s, w, size, size, p)
@@ -226,20 +172,20 @@ def _make_rates(rate: Any) -> tuple[Any, Any, Any]:
 
 def _make_draw(pair_rate: Any, row_of: Any) -> Any:
     @cold_piece
-    def second(s, w, a, p):  # type: ignore[no-untyped-def]
-        """Slot of the second particle, by its rate with the first; the first particle itself is left out."""
+    def second(s, w, a, p):
+        """Slot of the second particle, by its rate with the first, which is left out."""
         top, buckets, stored = _top(s, w), w.table.shape[1], s.count[STORED]
         size = _size(w, a)
         row = row_of(s, w, 0, size, top, p)
         if a < buckets:
             w.number[a] -= 1.0
-        small = _weigh(w.number, w.table, row, w.block, top)
+        small = weigh(w.number, w.table, row, w.block, top)
         large = 0.0
         for d in range(stored):
             if buckets + d != a:
                 large += pair_rate(s, w, size, w.large[d], p)
         x = rng.uniform(s.rng) * (small + large)
-        slot = _find(w.number, w.table, row, w.block, top, x) if x < small else -1
+        slot = find(w.number, w.table, row, w.block, top, x) if x < small else -1
         if slot < 0:
             x -= small
             for d in range(stored):
@@ -254,10 +200,10 @@ def _make_draw(pair_rate: Any, row_of: Any) -> Any:
         return slot
 
     @cold_piece
-    def draw(s, w, p, factor):  # type: ignore[no-untyped-def]
+    def draw(s, w, p, factor):
         s.count[FIRST] = -1
         s.count[TRIALS] += 1
-        small = _weigh(w.number, w.rate, 0, w.block, _top(s, w))
+        small = weigh(w.number, w.rate, 0, w.block, _top(s, w))
         large = 0.0
         for d in range(s.count[STORED]):
             large += w.large_rate[d]
@@ -277,10 +223,10 @@ def _make_draw(pair_rate: Any, row_of: Any) -> Any:
 
 def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
     @cold_piece
-    def account(s, w, i, j, gone, size, count, p):  # type: ignore[no-untyped-def]
-        """Account in the rates of all sizes for `gone` of `i` and `j` each and `count` new ones of `size`."""
+    def account(s, w, i, j, gone, size, count, p):
+        """Account in all rates for `gone` of `i` and `j` each and `count` new ones of `size`."""
         top = _top(s, w)
-        _shift(
+        shift(
             w.rate[0],
             w.table,
             row_of(s, w, 0, i, top, p),
@@ -297,7 +243,7 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
             )
 
     @cold_piece
-    def arrive(s, w, size, count, p):  # type: ignore[no-untyped-def]
+    def arrive(s, w, size, count, p):
         """Put `count` particles of `size` in, the rates of all others being up to date."""
         buckets = w.table.shape[1]
         s.count[PARTICLES] += count
@@ -313,7 +259,7 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
             w.large_rate[d] = own
 
     @cold_piece
-    def reach(s, w, size, p):  # type: ignore[no-untyped-def]
+    def reach(s, w, size, p):
         """Raise the largest size to which rates are kept."""
         old = _top(s, w)
         note_largest(s, size)
@@ -323,7 +269,7 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
             w.rate[0, k] = own_rate(s, w, np.int64(k + 1), p)
 
     @cold_piece
-    def update(s, w, entries, p):  # type: ignore[no-untyped-def]
+    def update(s, w, entries, p):
         buckets = w.table.shape[1]
         needed = 0
         for e in range(entries):
@@ -335,7 +281,7 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
             reach(s, w, s.sizes[e], p)
         i, j = _pair(s, w)
         a, b = s.count[FIRST], s.count[SECOND]
-        # the last large particle moves into a gap: taking the later slot first keeps the other in place
+        # the last large particle moves into a gap: the later slot goes first, so the other stays
         _remove(s, w, max(a, b))
         _remove(s, w, min(a, b))
         for e in range(entries):
@@ -349,7 +295,7 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
 
 def _make_prepare(own_rate: Any) -> Any:
     @cold_piece
-    def renew(s, w, p):  # type: ignore[no-untyped-def]
+    def renew(s, w, p):
         """Compute every rate afresh, and the largest size."""
         largest = np.int64(0)
         for k in range(w.table.shape[1]):
@@ -365,7 +311,7 @@ def _make_prepare(own_rate: Any) -> Any:
         s.count[SINCE] = 1
 
     @piece
-    def prepare(s, w, p):  # type: ignore[no-untyped-def]
+    def prepare(s, w, p):
         if s.count[SINCE] == 0 or s.count[SINCE] > _REFRESH:
             renew(s, w, p)
         return np.int64(0) if 0.0 <= s.clock[VALUE] < math.inf else np.int64(BAD_RATE)
@@ -377,8 +323,8 @@ def _make_prepare(own_rate: Any) -> Any:
 class Inverse(Method):
     """Choose the first particle by its rate with all others, the second by its rate with the first.
 
-    Particles of sizes up to `buckets` are counted by size with one rate a size; larger ones are held singly.
-    An event costs a few traversals of the sizes present, and none is rejected.
+    Particles of sizes up to `buckets` are counted by size with one rate a size; larger ones are
+    held singly. An event costs a few traversals of the sizes present, and none is rejected.
 
     Parameters
     ----------
@@ -423,7 +369,7 @@ class Inverse(Method):
         """See `Method.new_work`."""
         replicas = len(populations)
         # no size can exceed the mass, so small systems need few buckets
-        buckets = min(self.buckets, max(_BLOCK, 2 * mass))
+        buckets = min(self.buckets, max(BLOCK, 2 * mass))
         number = np.zeros((replicas, buckets))
         stored = [int(counts[sizes > buckets].sum()) for sizes, counts in populations]
         large = np.zeros((replicas, max(*stored, 8) * 2), np.int64)
@@ -436,7 +382,7 @@ class Inverse(Method):
         return Work(
             number,
             np.zeros((replicas, 1, buckets)),
-            np.zeros((replicas, -(-buckets // _BLOCK))),
+            np.zeros((replicas, -(-buckets // BLOCK))),
             large,
             np.zeros(large.shape),
             np.vstack((rates.table(buckets), np.zeros((3, buckets)))),

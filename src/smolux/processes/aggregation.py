@@ -26,6 +26,8 @@ class Aggregation(PairProcess):
     name: ClassVar[str] = "aggregation"
     outcome: ClassVar[Callable[..., Any]] = staticmethod(_merge)
 
-    def rhs(self, t: float, sizes: Float, n: Float, loss: Float, gain: Callable[[], Float]) -> Float:
+    def rhs(
+        self, t: float, sizes: Float, n: Float, loss: Float, gain: Callable[[], Float]
+    ) -> Float:
         """See `PairProcess.rhs`."""
         return gain() - loss

@@ -39,7 +39,9 @@ class PairProcess:
         """The rate as a multiple of the kernel, a function of time."""
         return TimeFunction.of(1.0)
 
-    def rhs(self, t: float, sizes: Float, n: Float, loss: Float, gain: Callable[[], Float]) -> Float:
+    def rhs(
+        self, t: float, sizes: Float, n: Float, loss: Float, gain: Callable[[], Float]
+    ) -> Float:
         """Contribution to ``dn/dt`` in the rate equations.
 
         Parameters

@@ -46,7 +46,9 @@ class Shattering(PairProcess):
         """λ as a function of time."""
         return TimeFunction.of(self.rate, "the shattering rate")
 
-    def rhs(self, t: float, sizes: Float, n: Float, loss: Float, gain: Callable[[], Float]) -> Float:
+    def rhs(
+        self, t: float, sizes: Float, n: Float, loss: Float, gain: Callable[[], Float]
+    ) -> Float:
         """See `PairProcess.rhs`."""
         rate = -self.factor(t) * loss
         rate[0] -= rate @ sizes

@@ -16,8 +16,8 @@ from .base import Float, Weighting
 class Number(Weighting):
     """Every simulated particle stands for one particle, and pairs react at the rate of the kernel.
 
-    The Marcus-Lushnikov process (A. H. Marcus, Technometrics 10, 133 (1968); A. A. Lushnikov, J. Colloid
-    Interface Sci. 65, 276 (1978)).
+    The Marcus-Lushnikov process (A. H. Marcus, Technometrics 10, 133 (1968); A. A. Lushnikov, J.
+    Colloid Interface Sci. 65, 276 (1978)).
     """
 
     name: ClassVar[str] = "number"

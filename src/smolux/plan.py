@@ -1,0 +1,180 @@
+"""The plan of a stochastic run: all that decides its outcome, checked once."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .core.state import Grid
+from .errors import InputError, did_you_mean
+from .methods import METHODS
+from .methods.base import Method
+from .model import Model
+from .weighting import WEIGHTINGS
+from .weighting.base import Weighting
+
+#: policies for a falling number of particles
+POPULATIONS = ("doubling", "fixed-volume")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that decides the outcome of a stochastic run."""
+
+    model: Model
+    times: tuple[float, ...]
+    method: Method
+    weighting: Weighting
+    population: str
+    particles: int
+    replicas: int
+    entropy: int
+    orders: tuple[float, ...]
+    sizes: int
+    bins_per_octave: int
+    distribution: bool
+
+    @property
+    def volume(self) -> float:
+        """Volume simulated at the start."""
+        return self.particles / self.model.initial.total
+
+    @cached_property
+    def grid(self) -> Grid:
+        """Output times, bin edges above the exact sizes, orders of moments."""
+        first = self.sizes + 1
+        steps = np.arange(int((62 - np.log2(first)) * self.bins_per_octave) + 1)
+        edges = np.unique([int(first * 2.0 ** (k / self.bins_per_octave)) for k in steps])
+        return Grid(np.array(self.times), edges.astype(np.int64), np.array(self.orders))
+
+    def groups(self, workers: int) -> list[tuple[int, int]]:
+        """Split the replicas: first and number of each group."""
+        together = max(1, 200_000 // self.particles)
+        each = max(1, min(together, -(-self.replicas // max(workers, 1))))
+        return [(r, min(each, self.replicas - r)) for r in range(0, self.replicas, each)]
+
+
+def make_plan(
+    model: Model,
+    times: ArrayLike,
+    method: str | Method,
+    weighting: str | Weighting,
+    population: str,
+    particles: int,
+    replicas: int,
+    seed: int | None,
+    orders: Sequence[float],
+    sizes: int,
+    bins_per_octave: int,
+    distribution: bool,
+) -> Plan:
+    """Check the arguments of `simulate`, all at once; parameters as there.
+
+    Raises
+    ------
+    InputError
+        With every mistake.
+    """
+    problems: list[str] = []
+    if not isinstance(model, Model):
+        problems.append(f"model = {model!r}: must be a smolux.Model(kernel=..., ...)")
+    found = {
+        "method": _chosen("method", method, METHODS, Method, problems),
+        "weighting": _chosen("weighting", weighting, WEIGHTINGS, Weighting, problems),
+    }
+    if population not in POPULATIONS:
+        problems.append(
+            f"population = {population!r}: unknown{did_you_mean(str(population), POPULATIONS)}"
+        )
+    numbers = {
+        "particles": _whole("particles", particles, 2, problems),
+        "replicas": _whole("replicas", replicas, 1, problems),
+        "sizes": _whole("sizes", sizes, 1, problems),
+        "bins_per_octave": _whole("bins_per_octave", bins_per_octave, 1, problems),
+    }
+    entropy = (
+        np.random.SeedSequence().entropy if seed is None else _whole("seed", seed, 0, problems)
+    )
+    output = check_times(times, problems)
+    powers = np.atleast_1d(np.asarray(orders, float))
+    if powers.ndim != 1 or not powers.size or not np.isfinite(powers).all():
+        problems.append(
+            f"orders = {orders!r}: must be a list of finite numbers, such as (0, 1, 2, 3)"
+        )
+    if problems:
+        raise InputError(problems)
+    plan = Plan(
+        model=model,
+        times=output,
+        population=population,
+        entropy=int(entropy),  # type: ignore[arg-type]
+        orders=tuple(float(p) for p in powers),
+        distribution=bool(distribution),
+        **found,
+        **numbers,  # type: ignore[arg-type]
+    )
+    _check_memory(plan)
+    return plan
+
+
+def _chosen(what: str, value: Any, registry: Sequence[Any], kind: type, problems: list[str]) -> Any:
+    if isinstance(value, kind):
+        return value
+    names = {entry.name: entry for entry in registry}
+    if isinstance(value, str) and value in names:
+        return names[value]()
+    problems.append(f"{what} = {value!r}: unknown{did_you_mean(str(value), list(names))}")
+    return None
+
+
+def _whole(what: str, value: Any, least: int, problems: list[str]) -> int:
+    try:
+        whole = int(value)
+        if whole == value and whole >= least and not isinstance(value, bool):
+            return whole
+    except (TypeError, ValueError, OverflowError):
+        pass
+    problems.append(f"{what} = {value!r}: must be a whole number of at least {least}")
+    return least
+
+
+def check_times(times: ArrayLike, problems: list[str]) -> tuple[float, ...]:
+    """Return output times as floats; add what is wrong with them to `problems`."""
+    try:
+        output = np.atleast_1d(np.asarray(times, float))
+    except (TypeError, ValueError):
+        problems.append(f"times = {times!r}: must be a list of numbers")
+        return ()
+    if output.ndim != 1 or not output.size:
+        problems.append(f"times = {times!r}: must be a list of at least one number")
+    elif not (np.isfinite(output).all() and output[0] >= 0 and output[-1] > 0):
+        problems.append(f"times = {times!r}: must be finite, zero or more, and end above zero")
+    elif (np.diff(output) <= 0).any():
+        k = int(np.argmax(np.diff(output) <= 0))
+        problems.append(f"times: must ascend, but {output[k + 1]:g} follows {output[k]:g}")
+    return tuple(float(t) for t in output.ravel())
+
+
+def _check_memory(plan: Plan) -> None:
+    """Refuse a run whose arrays cannot fit, before anything is computed."""
+    try:
+        available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):  # not known on this system
+        return
+    grid = plan.grid
+    row = 8 * (plan.sizes + len(grid.edges) + len(grid.orders) + 8)
+    observations = plan.replicas * len(plan.times) * row
+    stores = plan.replicas * plan.method.bytes_per_replica(plan.particles)
+    if observations + stores > 0.9 * available:
+        raise InputError(
+            f"the run needs about {(observations + stores) / 1e9:.1f} GB ({stores / 1e9:.1f} GB of "
+            f"particles, {observations / 1e9:.1f} GB of observations) and this machine has "
+            f"{available / 1e9:.1f} GB: lower particles = {plan.particles}, "
+            f"replicas = {plan.replicas}, sizes = {plan.sizes} or the number of times"
+        )
