@@ -123,18 +123,22 @@ def _kernel(table: Table) -> tuple[dict[str, Any], str]:
             "name", f'or give formula = "..."{hint.replace("; choose", "; choose a name")}'
         )
         return {}, ""
-    name = table.choice("name", None, list(laws))
+    physical = [f"{n}.{c}" for n, k in laws.items() for c in k.constructors]
+    name = table.choice("name", None, [*laws, *physical])
     if name is None:
         return {}, ""
+    name, _, constructor = name.partition(".")
     law = laws[name]
+    if constructor:
+        return _constructed(table, law, constructor)
     own = {f.name: f.default for f in fields(law)}
-    for constructor in getattr(law, "constructors", ()):
+    for constructor in law.constructors:  # the name alone will do, if the keys tell
         arguments = _signature(law, constructor)
         if any(a in table and a not in own for a in arguments):
             return _constructed(table, law, constructor)
     data = {"name": name, **_fields(table, "kernel", own)}
     # what else could have stood here
-    table.known += [a for c in getattr(law, "constructors", ()) for a in _signature(law, c)]
+    table.known += [a for c in law.constructors for a in _signature(law, c)]
     table.finish()
     return data, ""
 
@@ -290,7 +294,7 @@ def _require_units(data: Mapping[str, Any], problems: Problems) -> None:
     if law is not None and "scale" in {f.name for f in fields(law)} and "scale" not in kernel:
         needed = [
             [k for k, a in _signature(law, c).items() if a.default is a.empty]
-            for c in getattr(law, "constructors", ())
+            for c in law.constructors
         ]
         instead = "".join(f", or {' and '.join(names)}" for names in needed)
         problems.add(

@@ -12,15 +12,17 @@ import numpy as np
 
 from .. import units
 from ..errors import did_you_mean
+from ..population import POPULATIONS
 from .reader import Problems, Table, show
 
 #: the most output times a table of times may ask for
 _MOST_TIMES = 1_000_000
 _SPACINGS = ("linear", "log")
-#: what `population` may be, see `smolux.simulate`
-POPULATIONS = ("doubling", "fixed-volume")
+#: what may stand in ``[solve]``, see `smolux.solve`
 SOLVERS = ("auto", "direct", "low-rank")
-FIGURES = ("moments", "distribution", "summary")
+GELS = ("inert", "reacts")
+#: kinds of figures, see `smolux.plotting`
+FIGURES = ("clusters", "moments", "size-distribution", "oscillations", "scaling")
 
 
 @dataclass(frozen=True)
@@ -53,13 +55,15 @@ class Solve:
     method: str = "auto"
     tolerance: float = 1e-8
     largest: int | None = None
+    max_size: int | None = None
+    gel: str = "inert"
 
 
 @dataclass(frozen=True)
 class Output:
     """What is written beside the results."""
 
-    figures: tuple[str, ...] = ("moments", "distribution")
+    figures: tuple[str, ...] = ("clusters", "moments", "size-distribution")
     report: bool = True
 
 
@@ -76,7 +80,7 @@ def read_run(content: Any, problems: Problems) -> Run | None:
         "seed": table.integer("seed", None, 0),
         "method": table.choice("method", Run.method, [m.name for m in METHODS]),
         "weighting": table.choice("weighting", Run.weighting, [w.name for w in WEIGHTINGS]),
-        "population": table.choice("population", Run.population, POPULATIONS),
+        "population": table.choice("population", Run.population, list(POPULATIONS)),
         "orders": read_orders(table),
         "sizes": table.integer("sizes", Run.sizes, 1, 10_000_000),
         "bins_per_octave": table.integer("bins_per_octave", Run.bins_per_octave, 1, 100),
@@ -103,6 +107,8 @@ def read_solve(content: Any, run_times: tuple[float, ...] | None, problems: Prob
         "method": table.choice("method", Solve.method, SOLVERS),
         "tolerance": table.number("tolerance", Solve.tolerance, above=0.0),
         "largest": table.integer("largest", Solve.largest, 2, 100_000_000),
+        "max_size": table.integer("max_size", Solve.max_size, 2, 100_000_000),
+        "gel": table.choice("gel", Solve.gel, GELS),
     }
     if not settings["tolerance"] <= 0.1:
         table.bad("tolerance", "must be at most 0.1; 1e-8 is usual")
@@ -162,6 +168,9 @@ def read_times(table: Table) -> tuple[float, ...] | None:
         return None
     if min(times) < 0 or any(b <= a for a, b in pairwise(times)):
         table.bad("times", "must be zero or more and ascending")
+        return None
+    if times[-1] == 0:
+        table.bad("times", "the last one must be above zero")
         return None
     return tuple(times)
 

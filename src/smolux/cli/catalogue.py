@@ -1,0 +1,105 @@
+"""What is known of each kernel, as text."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import MISSING, fields
+
+from ..errors import InputError, did_you_mean
+from ..kernels import KERNELS
+from ..kernels.base import Kernel
+
+
+def example(law: type[Kernel]) -> Kernel:
+    """Make a kernel with its defaults, or with example parameters where it has none."""
+    return law(**law.example)
+
+
+def _degree(law: type[Kernel]) -> str:
+    """Return the homogeneity degree; of the example where a parameter sets it."""
+    degree = example(law).degree
+    return "-" if degree is None else f"{degree:.4g}"
+
+
+def _gels(law: type[Kernel]) -> str:
+    kernel = example(law)
+    if not kernel.gels:
+        return "no" if kernel.gels is False else "unknown"
+    time = kernel.gel_time()
+    return "yes" if time is None else f"at t = {time:.3g}" if time else "at once"
+
+
+def _parameters(law: type[Kernel]) -> str:
+    return ", ".join(f"{k} = {v:g}" for k, v in law.example.items())
+
+
+def overview() -> list[tuple[str, ...]]:
+    """Rows of the table of kernels: name, formula over scale, example, degree, gels, exact."""
+    return [
+        (
+            law.name,
+            law.formula.removeprefix("scale * ").replace("scale", "1"),
+            _parameters(law),
+            _degree(law),
+            _gels(law),
+            "yes" if law.exact else "no",
+        )
+        for law in KERNELS
+    ]
+
+
+def details(name: str) -> str:
+    """Everything about one kernel.
+
+    Raises
+    ------
+    InputError
+        If there is no such kernel.
+    """
+    laws = {law.name: law for law in KERNELS}
+    if name not in laws:
+        raise InputError(f"NAME = {name!r}: no such kernel{did_you_mean(name, list(laws))}")
+    law = laws[name]
+    words = inspect.cleandoc(law.__doc__ or "").split("\n\nParameters")[0].replace("``", "")
+    remark = f" ({_parameters(law)})" if law.example else ""
+    start = ", from monomers of unit density" if example(law).gels else ""
+    lines = [
+        f"{law.name}: K(i, j) = {law.formula}",
+        "",
+        words,
+        "",
+        f"degree     {_degree(law)}{remark}",
+        f"gels       {_gels(law)}{start}{remark}",
+        f"exact      {'yes, for monomers at the start' if law.exact else 'no'}",
+        f"reference  {law.reference}",
+        "",
+        "In a case file:",
+        "",
+        "    [kernel]",
+        f'    name = "{law.name}"',
+    ]
+    for f in fields(law):
+        value = law.example.get(f.name, 1.0 if f.default is MISSING else f.default)
+        lines.append(f"    {f.name} = {value!r}")
+    for constructor in law.constructors:
+        lines += ["", *_physical(law, constructor)]
+    return "\n".join(lines)
+
+
+def _physical(law: type[Kernel], constructor: str) -> list[str]:
+    from ..case.physics import ARGUMENTS
+
+    make = getattr(law, constructor)
+    words = inspect.cleandoc(make.__doc__).splitlines()[0].replace("``", "")
+    lines = [
+        f"From physical quantities: {words}",
+        "",
+        "    [kernel]",
+        f'    name = "{law.name}"',
+    ]
+    for key, argument in inspect.signature(make).parameters.items():
+        dimension = ARGUMENTS.get(key)
+        optional = "" if argument.default is argument.empty else "   # may be left out"
+        text = f'"{dimension.example}"' if dimension else repr(argument.default)
+        lines.append(f"    {key} = {text}{optional}")
+    return lines

@@ -1,0 +1,204 @@
+"""The work of ``smolux compare``: one case by several methods and the solver."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import smolux
+
+from .. import analysis
+from ..case import Case
+from ..deterministic import SolverError
+from ..deterministic.solve import solve
+from ..errors import InputError, did_you_mean
+from ..methods import METHODS
+from . import console
+from .progress import Display
+
+SOLVER = "solver"
+EXACT: Literal["exact"] = "exact"
+
+
+@dataclass(frozen=True)
+class Computed:
+    """One result of the case.
+
+    Attributes
+    ----------
+    name : str
+        The method, or the solver.
+    ds : xarray.Dataset
+    seconds, compile_seconds : float
+        Wall time without compilation, and the compilation.
+    collisions : float
+        In all replicas; NaN for the solver.
+    """
+
+    name: str
+    ds: Any
+    seconds: float
+    compile_seconds: float
+    collisions: float
+
+
+def choose(methods: Sequence[str] | None) -> list[str]:
+    """Return the methods to compare: those given, or all and the solver.
+
+    Raises
+    ------
+    InputError
+        If one is unknown.
+    """
+    known = [*(m.name for m in METHODS), SOLVER]
+    wrong = [m for m in methods or () if m not in known]
+    if wrong:
+        raise InputError([f"--method {m}: unknown{did_you_mean(m, known)}" for m in wrong])
+    return list(dict.fromkeys(methods or known))
+
+
+def compute(
+    case: Case, methods: Sequence[str], display: Callable[..., Display] = Display
+) -> list[Computed]:
+    """Compute a case by every method, each with random numbers of its own.
+
+    Parameters
+    ----------
+    case : Case
+        With a table ``[run]`` and its seed.
+    methods : sequence of str
+        As `choose` returns them.
+    display : callable
+        Makes the display of progress.
+    """
+    found = []
+    for number, name in enumerate(methods):
+        console.say(f"{name} ...")
+        if name == SOLVER:
+            with display(what="solving") as progress:
+                try:
+                    found.append(_solved(case, progress))
+                except SolverError as error:
+                    console.say(f"{SOLVER}: left out: {error}")
+        else:
+            with display() as progress:
+                found.append(_simulated(case, name, number, progress))
+    return found
+
+
+def _simulated(case: Case, name: str, number: int, progress: Display) -> Computed:
+    run = case.run
+    assert run is not None
+    assert run.seed is not None
+    settings = asdict(replace(run, method=name, seed=run.seed + number))
+    del settings["checkpoint_every"]
+    ds = smolux.simulate(case.model, **settings, progress=progress)
+    compiling = float(ds.attrs["compile_seconds"])
+    wall = float(ds.attrs["wall_seconds"]) - compiling
+    return Computed(name, ds, wall, compiling, float(ds.attrs["events"]))
+
+
+def _solved(case: Case, progress: Display) -> Computed:
+    run = case.run
+    assert run is not None
+    settings: dict[str, Any] = {"times": run.times, "tolerance": 1e-6}
+    if case.model.kernel.gels and all(p.name == "aggregation" for p in case.model.processes):
+        settings["gel"] = "reacts"  # as it does in a simulation
+    if case.solve is not None:
+        settings = {k: v for k, v in asdict(case.solve).items() if v is not None}
+    begun = time.perf_counter()
+    ds = solve(
+        case.model, **settings, orders=run.orders, sizes=run.sizes,
+        bins_per_octave=run.bins_per_octave, progress=progress,
+    )  # fmt: skip
+    wall = time.perf_counter() - begun
+    compiling = float(ds.attrs.get("compile_seconds", 0.0))
+    return Computed(SOLVER, ds, wall - compiling, compiling, float("nan"))
+
+
+def reference(found: Sequence[Computed]) -> tuple[str, Any]:
+    """Choose what the others are compared with: the exact solution, the solver, or the first."""
+    first = found[0]
+    if analysis.exact_dataset(first.ds) is not None:
+        return EXACT, EXACT
+    by_name = {c.name: c for c in found}
+    best = by_name.get(SOLVER, first)
+    return best.name, best.ds
+
+
+def rows(found: Sequence[Computed]) -> tuple[str, list[tuple[str, ...]], bool]:
+    """Compare results with their reference.
+
+    Returns
+    -------
+    name : str
+        Of the reference.
+    rows : list of tuple of str
+        Method, time, collisions per second, largest deviation and where, p, verdict.
+    agree : bool
+        Whether all agree.
+    """
+    name, standard = reference(found)
+    table, agree = [], True
+    for each in found:
+        speed = each.collisions / each.seconds if each.seconds > 0 else float("nan")
+        cells = [each.name, console.duration(each.seconds)]
+        cells.append("-" if speed != speed else f"{console.amount(speed)}/s")
+        if each.name == name or (each.name == SOLVER and name == EXACT):
+            table.append((*cells, *_deterministic(each, name)))
+            continue
+        test = analysis.compare(each.ds, standard).attrs
+        agree = agree and test["agree"] != 0
+        verdict = {1: "agrees", 0: "DIFFERS", -1: "untested"}[test["agree"]]
+        where = f"{test['largest_sigmas']:.1f} in {test['where']}" if test["where"] else "-"
+        table.append((*cells, where, f"{test['p_value']:.2g}", verdict))
+    return name, table, agree
+
+
+def _deterministic(each: Computed, name: str) -> tuple[str, str, str]:
+    """Cells of the reference, or of the solver beside the exact solution: no sigmas, a ratio."""
+    if each.name == name:
+        return "-", "-", "reference"
+    relative = analysis.compare(each.ds, EXACT)["moment"].sel(statistic="relative")
+    return f"{float(abs(relative).max()):.1e} relative, in the moments", "-", "no scatter"
+
+
+def run(case: Case, methods: Sequence[str] | None, figure: Path | None) -> bool:
+    """Compute a case by several methods, print how they compare, and draw it if wanted.
+
+    Returns
+    -------
+    bool
+        Whether all agree.
+
+    Raises
+    ------
+    InputError
+        If the case has no table ``[run]``, or a method is unknown.
+    """
+    if case.run is None:
+        raise InputError("compare: the case has no table [run], so there is nothing to simulate")
+    seeded = case.with_seed()
+    assert seeded.run is not None
+    chosen = choose(methods)
+    console.say(f"seed {seeded.run.seed}")
+    found = compute(seeded, chosen)
+    if not found:
+        raise InputError("compare: nothing could be computed")
+    name, table, agree = rows(found)
+    console.table(
+        ("method", "time", "collisions", "largest deviation (σ)", "p", ""), table, left=(0, 3, 5)
+    )
+    print(
+        f"Compared with {'the exact solution' if name == EXACT else name}, at all times: moments "
+        "and size densities.\nTimes are without compilation. p below 0.001 is a difference."
+    )
+    if figure is not None:
+        from .. import plotting
+
+        plotting.save(plotting.comparison({c.name: c.ds for c in found}), figure)
+        print(f"{figure} written")
+    return agree

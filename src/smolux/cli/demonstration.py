@@ -1,0 +1,90 @@
+"""The work of ``smolux demo``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from .. import analysis
+from ..case import Case, Output, Run
+from ..errors import InputError
+from ..files import replacing
+from ..kernels import Constant
+from ..model import Model
+from . import rundir, running
+from .console import say
+
+TITLE = "Demo: constant kernel"
+
+
+def case(seed: int) -> Case:
+    """Return the case of the demo."""
+    return Case(
+        Model(kernel=Constant()),
+        Run((0.5, 1.0, 2.0, 5.0, 10.0, 20.0), particles=100_000, replicas=8, seed=seed),
+        output=Output(("clusters", "size-distribution")),
+        title=TITLE,
+    )
+
+
+def run(seed: int, folder: Path) -> tuple[str, bool]:
+    """Run the demo in a folder.
+
+    Returns
+    -------
+    text : str
+        What came out.
+    agrees : bool
+        Whether it agrees with the exact solution.
+
+    Raises
+    ------
+    InputError
+        If the folder holds something else than an earlier demo.
+    """
+    directory = _folder(folder, case(seed))
+    say(f"{TITLE}, 100000 particles, 8 replicas, seed {seed}")
+    outcome = running.proceed(directory)
+    rows = analysis.tables(analysis.summary(outcome.results), ["number_density"])[0][1]
+    header = ("time", "clusters per volume", *rows[0][2:])
+    words, agrees = verdict(outcome.results)
+    return "\n".join([_text([header, *rows[1:]]), "", words, _where(directory)]), agrees
+
+
+def _folder(folder: Path, wanted: Case) -> rundir.RunDirectory:
+    """Return the folder, cleared of an earlier demo."""
+    directory = rundir.RunDirectory(folder)
+    if directory.case.is_file():
+        if directory.load().title != TITLE:
+            raise InputError(f"-o {folder}: holds a run of yours; name another folder")
+        for file in (directory.results, directory.checkpoint):
+            file.unlink(missing_ok=True)
+    elif folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"-o {folder}: is not empty; name a new folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    with replacing(directory.case) as temporary:
+        temporary.write_text(wanted.to_toml(), encoding="utf-8")
+    return directory
+
+
+def _text(rows: list[tuple[str, ...]]) -> str:
+    width = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join(cell.rjust(w) for cell, w in zip(row, width, strict=True)) for row in rows
+    )
+
+
+def verdict(ds: Any) -> tuple[str, bool]:
+    """Say and return whether a result agrees with the exact solution."""
+    found = analysis.compare(ds, "exact").attrs
+    agrees = found["agree"] == 1
+    words = "agrees" if agrees else "DOES NOT AGREE"
+    text = (
+        f"The simulation {words} with the exact solution: all {found['entries']} moments and "
+        f"densities\ntogether have p = {found['p_value']:.2g} (below 0.001 would be a difference)."
+    )
+    return text, agrees
+
+
+def _where(directory: rundir.RunDirectory) -> str:
+    return f"Figures, results and {directory.report} are written; next: smolux new my-case"

@@ -1,0 +1,312 @@
+"""What a case will cost, and what to beware of, from a small pilot run."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import smolux
+
+from ..case import Case
+from ..case.settings import Run
+from ..errors import Interrupted
+from ..initial import Sizes
+
+Float = NDArray[np.float64]
+
+#: particles of the first pilot, and the seconds for which a larger one is worth trying
+_FIRST, _SHORT, _LIMIT = 1000, 0.2, 4.0
+_SEED = 20_240_229
+#: particles below which the means of a simulation say little
+_FEW = 100.0
+
+
+@dataclass(frozen=True)
+class Pilot:
+    """A small run of a case, with doubling so that it reaches the end.
+
+    Attributes
+    ----------
+    particles : int
+        At its start.
+    times, number_density, collisions, volume, largest : ndarray
+        Those of its output times that it reached.
+    seconds_per_collision : float
+        On one core.
+    end : float
+        The last output time of the case.
+    """
+
+    particles: int
+    times: Float
+    number_density: Float
+    collisions: Float
+    volume: Float
+    largest: Float
+    seconds_per_collision: float
+    end: float
+
+    @property
+    def reached(self) -> float:
+        """Share of the simulated time that the pilot covers."""
+        return float(self.times[-1] / self.end)
+
+    def expected_collisions(self, run: Run) -> float:
+        """Collisions of one replica of the case, extrapolated if the pilot is short."""
+        scale = run.particles / self.particles
+        if run.population == "fixed-volume":
+            steps = np.diff(self.collisions, prepend=0.0)
+            total = float(np.sum(steps * self.volume[0] / self.volume)) * scale
+        else:
+            total = float(self.collisions[-1]) * scale
+        return total / max(self.reached, 1e-9)
+
+    def fewest(self, run: Run) -> float:
+        """Particles of one replica of the case where they are fewest, were the volume fixed."""
+        return float(np.min(self.number_density) / self.number_density[0]) * run.particles
+
+    def growth(self, run: Run) -> float:
+        """Most particles of one replica over those at its start."""
+        ratio = self.number_density / self.number_density[0]
+        if run.population == "doubling":
+            ratio = ratio * self.volume / self.volume[0]
+        return float(max(1.0, np.max(ratio)))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a case will cost.
+
+    Attributes
+    ----------
+    collisions : float
+        In all replicas.
+    seconds : float
+        Wall time of the simulation, without compilation.
+    memory, output : float
+        Bytes.
+    warnings : list of str
+    """
+
+    collisions: float
+    seconds: float
+    memory: float
+    output: float
+    warnings: list[str] = field(default_factory=list)
+
+
+def _once(case: Case, particles: int) -> tuple[Any, bool]:
+    """Run one pilot; what it reached, and whether that is the end."""
+    run = case.run
+    assert run is not None
+    end = run.times[-1]
+    times = np.union1d(np.linspace(0, end, 49), end * np.geomspace(1e-6, 1, 49))
+    started: list[float] = []
+
+    def halt(progress: Any) -> None:
+        # first called when all is compiled, which a time limit would count
+        started.append(perf_counter())
+        if started[-1] - started[0] > _LIMIT:
+            raise KeyboardInterrupt
+
+    try:
+        ds = smolux.simulate(
+            case.model, times, method=run.method, weighting=run.weighting, particles=particles,
+            replicas=1, seed=_SEED, orders=(0,), sizes=1, progress=halt,
+        )  # fmt: skip
+    except Interrupted as stop:
+        return stop.dataset, False
+    return ds, True
+
+
+def pilot(case: Case) -> Pilot:
+    """Run a case with few particles, more of them as long as that takes next to no time."""
+    assert case.run is not None
+    particles = min(_FIRST, case.run.particles)
+    while True:
+        ds, done = _once(case, particles)
+        seconds = float(ds.attrs["compute_seconds"])
+        if not done or seconds > _SHORT or particles == case.run.particles:
+            break
+        particles = min(8 * particles, case.run.particles)
+    first = ds.isel(replica=0)
+    seen = np.isfinite(first["number_density"].values)
+    events = max(float(ds.attrs["events"]), 1.0)
+    values = {
+        name: first[name].values[seen]
+        for name in ("number_density", "collisions", "volume", "largest")
+    }
+    return Pilot(
+        particles, first["time"].values[seen], **values,
+        seconds_per_collision=seconds / events, end=case.run.times[-1],
+    )  # fmt: skip
+
+
+def estimate(case: Case) -> Estimate:
+    """Estimate what the simulation of a case will cost, and what to beware of.
+
+    Parameters
+    ----------
+    case : Case
+        With a table ``[run]``.
+
+    Returns
+    -------
+    Estimate
+    """
+    run = case.run
+    assert run is not None
+    small = pilot(case)
+    collisions = small.expected_collisions(run) * run.replicas
+    workers = min(run.replicas, cores())
+    memory, output = _bytes(case, run, small)
+    return Estimate(
+        collisions,
+        collisions * small.seconds_per_collision / workers,
+        memory,
+        output,
+        [*physics_warnings(case), *_population_warnings(run, small), *_pilot_warnings(small)],
+    )
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _bytes(case: Case, run: Run, small: Pilot) -> tuple[float, float]:
+    from ..methods import METHODS
+
+    method = next(m for m in METHODS if m.name == run.method)()
+    mass = run.particles * mean_size(case)
+    octaves = max(0.0, float(np.log2(max(mass, 2) / run.sizes)))
+    columns = 8 + len(run.orders) + run.sizes + octaves * run.bins_per_octave
+    output = 8.0 * run.replicas * len(run.times) * columns
+    if run.distribution:
+        output += 16.0 * run.replicas * len(run.times) * min(run.particles, 2e5)
+    most = int(run.particles * small.growth(run))
+    return run.replicas * method.bytes_per_replica(most) + output, output
+
+
+def mean_size(case: Case) -> float:
+    """Mean size at the start, from a sample."""
+    sizes, counts = case.model.initial.sample(10_000, 0.5)
+    return float(np.average(sizes, weights=counts))
+
+
+# --- warnings --------------------------------------------------------------------------------
+
+
+def physics_warnings(case: Case) -> list[str]:
+    """Tell what to beware of, whatever the method: gelation, sizes that are rare."""
+    return [*_gelation(case), *_shares(case)]
+
+
+def negative_rates(case: Case) -> list[str]:
+    """Find mistakes that a run would meet only on its way: rates that fall below zero."""
+    found = []
+    times = np.linspace(0.0, case.times[-1], 2001)
+    for process in case.model.processes:
+        factor = process.factor
+        if factor.constant is not None:
+            continue
+        values = np.asarray(factor(times))
+        wrong = ~(np.isfinite(values) & (values >= 0))
+        if wrong.any():
+            t = times[np.argmax(wrong)]
+            found.append(
+                f"the rate of {process.name}, {factor.text}, is {float(factor(float(t))):.3g} at "
+                f"t = {t:.6g}; it must be a finite number, zero or more, up to the last time: "
+                f'for example "max(0, {factor.text})"'
+            )
+    return found
+
+
+def _gelation(case: Case) -> list[str]:
+    kernel, initial = case.model.kernel, case.model.initial
+    if any(p.name != "aggregation" for p in case.model.processes):
+        return []  # what breaks clusters up can prevent a gel: no statement is known
+    end = case.times[-1]
+    if kernel.gels is None:
+        if kernel.degree is None or kernel.degree <= 1:
+            return []
+        return [
+            f"the kernel has degree {kernel.degree:.3g}, above 1: it may gel (one cluster takes a "
+            "finite share of the mass in finite time)"
+        ]
+    unit = kernel.gel_time()
+    if not kernel.gels:
+        return []
+    after = (
+        "from then on one cluster holds a finite share of the mass: a simulation follows it (see "
+        "'largest'), the rate equations lose it"
+    )
+    if unit is None:
+        return [f"the kernel gels, at a time that is not known; {after}"]
+    if initial.largest > 1:
+        scale = initial.total * mean_size(case)
+        return [
+            f"the kernel gels, monomers of the same mass at t = {unit / scale:.4g}, this initial "
+            f"condition sooner; {after}"
+        ] if unit / scale <= end else []  # fmt: skip
+    time = unit / initial.total
+    return [f"gelation at t = {time:.4g}, before the end at {end:.4g}: {after}"] if (
+        time <= end
+    ) else []  # fmt: skip
+
+
+def _shares(case: Case) -> list[str]:
+    initial, run = case.model.initial, case.run
+    if run is None or not isinstance(initial, Sizes):
+        return []
+    expected = {
+        size: density / initial.total * run.particles
+        for size, density in zip(initial.sizes, initial.densities_, strict=True)
+    }
+    rare = [size for size, count in expected.items() if 0 < count < 10]
+    if not rare:
+        return []
+    return [
+        f"of size {', '.join(map(str, rare))} there are fewer than 10 particles at the start: use "
+        "more particles"
+    ]
+
+
+def _population_warnings(run: Run, small: Pilot) -> list[str]:
+    found = []
+    fewest = small.fewest(run)
+    if run.population == "fixed-volume" and fewest < _FEW:
+        what = (
+            "everything becomes one cluster (extinction)"
+            if fewest < 2
+            else "replicas may end as one cluster (extinction)"
+        )
+        found.append(
+            f"without doubling only about {fewest:.3g} of {run.particles} particles are left where "
+            f'they are fewest: {what}; use more particles, or population = "doubling"'
+        )
+    growth = small.growth(run)
+    if growth > 4:
+        found.append(
+            f"a replica grows to about {growth * run.particles:.2g} particles, {growth:.2g} times "
+            "those at its start: shattering after doublings"
+        )
+    if run.replicas == 1:
+        found.append("one replica gives no error bars; use 8 or more")
+    return found
+
+
+def _pilot_warnings(small: Pilot) -> list[str]:
+    if small.reached >= 1:
+        return []
+    return [
+        f"a pilot with {small.particles} particles got to t = {small.times[-1]:.4g} of "
+        f"{small.end:.4g} in {_LIMIT:g} s: the numbers above are extrapolated, and may be far off"
+    ]

@@ -1,0 +1,149 @@
+"""How far a run is: a bar in a terminal, else a line now and then."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Protocol
+
+from .console import amount, duration, say
+
+
+class Progress(Protocol):
+    """What `smolux.simulate` and `smolux.solve` report."""
+
+    @property
+    def events(self) -> int:
+        """Collisions, or time steps, so far."""
+
+    @property
+    def fraction(self) -> float:
+        """Share that is done."""
+
+    @property
+    def events_per_second(self) -> float:
+        """Speed."""
+
+    @property
+    def seconds_left(self) -> float:
+        """Estimate; NaN when nothing is known yet."""
+
+    @property
+    def compile_seconds(self) -> float:
+        """Spent on compiling."""
+
+
+class Display:
+    """Shows progress on standard error; called with a `Progress` a few times a second.
+
+    Parameters
+    ----------
+    check : callable, optional
+        Called each time; may raise to stop the run.
+    terminal : bool, optional
+        Whether there is a terminal for a bar; found out if left out.
+    what : {"simulating", "solving"}
+        What is done, for the bar.
+    every : float
+        Seconds between two lines where there is no terminal.
+    clock : callable
+        Seconds.
+    """
+
+    def __init__(
+        self,
+        check: Callable[[], None] | None = None,
+        terminal: bool | None = None,
+        what: str = "simulating",
+        every: float = 10.0,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.terminal = sys.stderr.isatty() if terminal is None else terminal
+        self.check, self.what, self.every, self.clock = check, what, every, clock
+        self.unit = "events" if what == "simulating" else "steps"
+        self.last: Progress | None = None
+        self._due = 0.0
+        self._bar: Any = None
+        self._task: Any = None
+
+    def __enter__(self) -> Display:
+        if self.terminal:
+            self._open_bar()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
+    def __call__(self, progress: Progress) -> None:
+        """Show how far the run is."""
+        if self.last is None:
+            self._due = self.clock() + self.every
+            if progress.compile_seconds > 0.5:
+                self._print(f"compiled in {duration(progress.compile_seconds)}")
+        self.last = progress
+        if self._bar is not None:
+            self._bar.update(
+                self._task, total=1.0, completed=progress.fraction, description=self.what,
+                rate=rate(progress, self.unit), left=left(progress),
+            )  # fmt: skip
+        elif self.clock() >= self._due:
+            self._due = self.clock() + self.every
+            say(line(progress, self.unit))
+        if self.check is not None:
+            self.check()
+
+    def _print(self, text: str) -> None:
+        if self._bar is not None:
+            self._bar.console.print(text)
+        else:
+            say(text)
+
+    def _open_bar(self) -> None:
+        from rich.progress import BarColumn, TaskProgressColumn, TextColumn
+        from rich.progress import Progress as Bar
+
+        from .console import err
+
+        self._bar = Bar(
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=24),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[rate]}"),
+            TextColumn("{task.fields[left]}"),
+            console=err(),
+            transient=True,
+        )
+        first = "compiling" if self.what == "simulating" else self.what
+        self._task = self._bar.add_task(first, total=None, rate="", left="")
+        self._bar.start()
+
+
+def rate(progress: Progress, unit: str = "events") -> str:
+    """Write the speed: ``"2.1 M events/s"``."""
+    return f"{amount(progress.events_per_second)} {unit}/s"
+
+
+def left(progress: Progress) -> str:
+    """Write the time left: ``"40 s left"``; nothing while it is not known."""
+    known = progress.seconds_left == progress.seconds_left
+    return f"{duration(progress.seconds_left)} left" if known else ""
+
+
+def line(progress: Progress, unit: str = "events") -> str:
+    """Write all in a line: ``"43 %, 1.2 M events, 2.1 M events/s, 40 s left"``."""
+    parts = (
+        f"{100 * progress.fraction:.0f} %",
+        f"{amount(progress.events)} {unit}",
+        rate(progress, unit),
+        left(progress),
+    )
+    return ", ".join(part for part in parts if part)

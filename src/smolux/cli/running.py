@@ -1,0 +1,194 @@
+"""Running a case in its folder, from wherever it stands: the same for a new run and an old one."""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+import warnings
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import smolux
+
+from .. import results
+from ..case import Case
+from ..deterministic import SolverError
+from ..deterministic.solve import solve
+from ..errors import InputError, Interrupted, SmoluxWarning
+from . import figures, report
+from .console import duration, say
+from .progress import Display
+from .rundir import RunDirectory
+from .signals import Stopper
+
+#: units of the variables of a case in SI units; all others are plain numbers
+_SI = {
+    "time": "s",
+    "extinction_time": "s",
+    "volume": "m3",
+    **dict.fromkeys(("number_density", "moment", "n", "n_bin"), "m-3"),
+}
+
+
+@dataclass
+class Outcome:
+    """What a run has given.
+
+    Attributes
+    ----------
+    results : xarray.Dataset
+    solution : xarray.Dataset or None
+        Of the rate equations, if both were wanted.
+    remarks : list of str
+        On what was left out.
+    """
+
+    results: Any
+    solution: Any
+    remarks: list[str]
+
+
+def proceed(directory: RunDirectory, display: Callable[..., Display] = Display) -> Outcome:
+    """Do what is still to be done of a run: simulate, solve, draw, report.
+
+    Parameters
+    ----------
+    directory : RunDirectory
+        With its case.
+    display : callable
+        Makes the display of progress, see `Display`.
+
+    Raises
+    ------
+    Interrupted
+        On a signal or past the time limit: what there is has been written, and the run goes on from
+        there.
+    """
+    case = directory.load()
+    with Stopper() as stopper, warnings.catch_warnings():
+        # they stand in the results, and are told with them
+        warnings.simplefilter("ignore", SmoluxWarning)
+        try:
+            return _stages(case, directory, stopper, display)
+        except KeyboardInterrupt as stop:
+            reason = str(stop) if isinstance(stop, Interrupted) else "stopped"
+            raise Interrupted(f"{reason}\ngo on with: smolux run {directory.path}") from None
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS):
+                raise
+            raise Interrupted(
+                f"error: {error.strerror or error}\n"
+                f"when there is room, go on with: smolux run {directory.path}"
+            ) from error
+
+
+def _stages(
+    case: Case, directory: RunDirectory, stopper: Stopper, display: Callable[..., Display]
+) -> Outcome:
+    ds, solution = None, None
+    remarks: list[str] = []
+    if case.run is not None:
+        ds = _finished(directory.results, directory.checkpoint)
+        if ds is None:
+            ds = _simulate(case, directory, stopper, display)
+    if case.solve is not None:
+        file = directory.results if ds is None else directory.solution
+        solution = _finished(file)
+        try:
+            solution = solution if solution is not None else _solve(case, file, display)
+        except SolverError as error:
+            if ds is None:
+                raise InputError(f"solve: {error}") from None
+            # the simulation has nothing to do with it, and stays
+            remarks.append(f"no solution of the rate equations: {error}")
+    if ds is None:
+        ds, solution = solution, None
+    files, undrawn = figures.write(case.output.figures, ds, directory.path, solution)
+    if case.output.report:
+        report.write(directory.report, case, ds, solution, files)
+    return Outcome(ds, solution, [*remarks, *undrawn])
+
+
+def _finished(file: Path, checkpoint: Path | None = None) -> Any:
+    """Load results that are complete; None if there are none."""
+    if not file.is_file() or (checkpoint is not None and checkpoint.is_file()):
+        return None
+    ds = results.load(file)
+    return ds if ds.attrs.get("complete", 1) else None
+
+
+def _simulate(
+    case: Case, directory: RunDirectory, stopper: Stopper, display: Callable[..., Display]
+) -> Any:
+    run = case.run
+    assert run is not None
+    stopper.patient = True
+    with display(check=stopper.check) as progress:
+        settings: dict[str, Any] = {
+            "progress": progress,
+            "checkpoint_every": run.checkpoint_every,
+            "time_limit": run.time_limit,
+        }
+        try:
+            if directory.checkpoint.is_file():
+                ds = smolux.resume(directory.checkpoint, **settings)
+            else:
+                ds = smolux.simulate(
+                    case.model, checkpoint=directory.checkpoint, **_arguments(case), **settings
+                )
+        except Interrupted as stop:
+            _store(stop.dataset, case, directory.results)
+            share = f", {100 * progress.last.fraction:.0f} % done" if progress.last else ""
+            raise Interrupted(f"{str(stop).partition(';')[0]}{share}") from None
+    _store(ds, case, directory.results)
+    say(
+        f"simulated in {duration(float(ds.attrs['wall_seconds']))}"
+        f" ({duration(float(ds.attrs['compile_seconds']))} of it compiling)"
+    )
+    stopper.patient = False
+    stopper.check()
+    return ds
+
+
+def _arguments(case: Case) -> dict[str, Any]:
+    """Return the arguments of `smolux.simulate` that decide on the data."""
+    settings = asdict(case.run)  # type: ignore[arg-type]
+    return {k: v for k, v in settings.items() if k not in ("checkpoint_every", "time_limit")}
+
+
+def _solve(case: Case, file: Path, display: Callable[..., Display]) -> Any:
+    assert case.solve is not None
+    settings = {k: v for k, v in asdict(case.solve).items() if v is not None}
+    if case.run is not None:
+        settings |= {
+            "orders": case.run.orders,
+            "sizes": case.run.sizes,
+            "bins_per_octave": case.run.bins_per_octave,
+        }
+    with display(what="solving") as progress:
+        ds = solve(case.model, **settings, progress=progress)
+    _store(ds, case, file)
+    say(f"solved in {duration(float(ds.attrs['wall_seconds']))}")
+    return ds
+
+
+def _store(ds: Any, case: Case, file: Path) -> None:
+    """Save a result with its case; if its folder cannot take it, save it elsewhere and say so."""
+    ds.attrs["case"] = case.to_toml()
+    if case.title:
+        ds.attrs["title"] = case.title
+    if case.si:
+        for name, unit in _SI.items():
+            if name in ds.variables:
+                ds[name].attrs["units"] = unit
+    try:
+        results.save(ds, file)
+    except OSError:
+        handle, name = tempfile.mkstemp(prefix=f"smolux-{file.stem}-", suffix=".nc")
+        os.close(handle)
+        results.save(ds, name)  # if that fails too, the first error is told with it
+        say(f"{file} cannot be written; what was computed is in {name}")
+        raise

@@ -1,0 +1,111 @@
+"""Results as text, and where they are found."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import analysis, results
+from ..errors import InputError
+
+
+def find(path: Path) -> Path:
+    """Return the results file of a folder, or the file itself.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if not path.is_dir():
+        return path
+    file = path / "results.nc"
+    if not file.is_file():
+        hint = f"; run it with: smolux run {path}" if (path / "case.toml").is_file() else ""
+        raise InputError(f"{path}: there is no results.nc in it{hint}")
+    return file
+
+
+def load(path: Path) -> Any:
+    """Read a result.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it cannot be read.
+    """
+    return results.load(find(path))
+
+
+def load_solution(path: Path) -> Any:
+    """Read the solution of the rate equations beside a result; None if there is none."""
+    file = find(path).with_name("solution.nc")
+    return results.load(file) if file.is_file() and file != path else None
+
+
+def warnings(ds: Any) -> list[str]:
+    """Return the warnings that a result carries."""
+    return list(json.loads(ds.attrs.get("warnings", "[]")))
+
+
+#: output times in a table, unless all are wanted
+MOST = 12
+
+
+def text(ds: Any, most: int = MOST) -> str:
+    """Say how a result was made, and write its summary as tables.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset
+        A result.
+    most : int
+        Output times shown; if there are more, some of them, the first and the last included.
+    """
+    attributes = ds.attrs
+    facts = [str(attributes.get("method", "?"))]
+    if "initial_particles" in attributes:
+        facts += [
+            f"{attributes['initial_particles']} particles",
+            f"{ds.sizes['replica']} replicas",
+            str(attributes.get("population", "")),
+            f"seed {attributes.get('seed', '?')}",
+        ]
+    if not attributes.get("complete", 1):
+        facts.append("unfinished")
+    lines = [str(attributes.get("title", "")), ", ".join(f for f in facts if f), ""]
+    lines.append(analysis.format_table(chosen(ds, most)).rstrip())
+    lines += [mass(ds), shown(ds, most)]
+    lines += [f"warning: {w}" for w in warnings(ds)]
+    return "\n".join(line for n, line in enumerate(lines) if line or n == 2).strip()
+
+
+def shown(ds: Any, most: int) -> str:
+    """Say that not all times are shown; nothing if they are."""
+    times = ds.sizes["time"]
+    return f"{most} of {times} times are shown." if times > most else ""
+
+
+def chosen(ds: Any, most: int) -> Any:
+    """Return the summary of at most so many times and of the moments that change."""
+    times = ds.sizes["time"]
+    if times > most:
+        ds = ds.isel(time=np.unique(np.linspace(0, times - 1, most).round().astype(int)))
+    summary = analysis.summary(ds, sizes=())
+    changing = [p for p in summary["order"].values if p not in (0, 1)]
+    return summary.drop_vars("n").sel(order=changing)
+
+
+def mass(ds: Any) -> str:
+    """Say how well the mass is conserved; nothing if it was not observed."""
+    if 1 not in ds["order"].values:
+        return ""
+    m1 = ds["moment"].sel(order=1).values
+    if not np.isfinite(m1).any():
+        return ""
+    spread = (np.nanmax(m1) - np.nanmin(m1)) / np.nanmean(m1)
+    words = "to rounding" if spread < 1e-12 else f"to {spread:.1e}"
+    return f"Mass M1 = {np.nanmean(m1):.6g}, constant {words}."
