@@ -16,11 +16,9 @@ from .errors import InputError, did_you_mean
 from .methods import METHODS
 from .methods.base import Method
 from .model import Model
+from .population import POPULATIONS
 from .weighting import WEIGHTINGS
 from .weighting.base import Weighting
-
-#: policies for a falling number of particles
-POPULATIONS = ("doubling", "fixed-volume")
 
 
 @dataclass(frozen=True)
@@ -90,7 +88,7 @@ def make_plan(
     }
     if population not in POPULATIONS:
         problems.append(
-            f"population = {population!r}: unknown{did_you_mean(str(population), POPULATIONS)}"
+            f"population = {population!r}: unknown{did_you_mean(str(population), list(POPULATIONS))}"
         )
     numbers = {
         "particles": _whole("particles", particles, 2, problems),

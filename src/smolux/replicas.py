@@ -43,6 +43,7 @@ from .errors import InputError
 from .initial import Sizes
 from .model import Model
 from .plan import Plan
+from .population import doubles_at
 
 Int = NDArray[np.int64]
 
@@ -77,8 +78,7 @@ class Group:
         populations = [_population(plan, r) for r in range(first, first + count)]
         state.clock[:, VOLUME] = plan.volume
         state.clock[:, EXTINCT] = np.nan
-        if plan.population == "doubling":
-            state.count[:, DOUBLE_AT] = plan.particles // 2
+        state.count[:, DOUBLE_AT] = doubles_at(plan.population, plan.particles)
         state.count[:, PAUSE] = plan.distribution
         mass = plan.particles * plan.model.initial.largest
         rates = rates_for(plan.model, plan.weighting)

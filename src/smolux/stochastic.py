@@ -86,7 +86,7 @@ def simulate(
         How the next pair is found, see `smolux.methods.METHODS`.
     weighting : str or Weighting
         What one simulated particle stands for, see `smolux.weighting.WEIGHTINGS`.
-    population : {"doubling", "fixed-volume"}
+    population : {"doubling", "fixed-volume", "none"}
         Double the volume, every particle once more, when half of the initial number are left; or
         do not.
     particles : int
