@@ -73,8 +73,8 @@ if TYPE_CHECKING:
         weighting,
     )
     from . import plotting as plot
-    from .analysis import summary
-    from .deterministic import solve
+    from .analysis.summary import summary
+    from .deterministic.solve import solve
     from .errors import InputError, Interrupted, SmoluxWarning
     from .model import Model
     from .stochastic import resume, simulate

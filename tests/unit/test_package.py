@@ -1,0 +1,81 @@
+"""The package as a whole: its names, what it loads and when."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.resources
+import subprocess
+import sys
+
+import pytest
+
+import smolux
+
+HEAVY = ("numba", "scipy", "xarray", "matplotlib", "pint", "pandas", "h5netcdf", "rich", "typer")
+
+
+def loaded_after(code: str) -> set[str]:
+    """Heavy packages that a fresh interpreter has loaded after running some code."""
+    report = "import sys; print(' '.join(sorted({m.partition('.')[0] for m in sys.modules})))"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{code}\n{report}"], capture_output=True, text=True, check=True
+    )
+    return set(HEAVY) & set(done.stdout.split())
+
+
+def test_import_loads_nothing_heavy():
+    assert (
+        loaded_after("import smolux; smolux.InputError; smolux.__version__; dir(smolux)") == set()
+    )
+
+
+def test_physics_is_described_without_numba():
+    code = (
+        "import smolux as sx\n"
+        "fading = sx.processes.Shattering('0.01*exp(-t)')\n"
+        "sx.Model(sx.kernels.Ballistic(), [sx.processes.Aggregation(), fading],\n"
+        "         sx.initial.exponential(3.0))\n"
+        "sx.kernels.from_function(lambda i, j: i + j)(1, 2)"
+    )
+    assert loaded_after(code) <= {"scipy"}
+
+
+@pytest.mark.parametrize("name", smolux.__all__)
+def test_every_public_name_is_there(name):
+    assert getattr(smolux, name) is not None
+    assert name in dir(smolux)
+
+
+def test_names_are_the_objects_they_stand_for():
+    assert smolux.plot is smolux.plotting
+    assert smolux.simulate.__module__ == "smolux.stochastic"
+    assert smolux.solve.__module__ == "smolux.deterministic.solve"
+    assert callable(smolux.summary)
+
+
+def test_unknown_name():
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        smolux.simulat  # noqa: B018
+
+
+def test_version_is_that_of_the_distribution():
+    assert smolux.__version__ == importlib.metadata.version("smolux")
+
+
+def test_what_is_installed_beside_the_code():
+    files = importlib.resources.files("smolux")
+    assert (files / "py.typed").is_file()
+    assert (files / "templates" / "shattering.toml").is_file()
+
+
+def test_registries_name_their_entries_uniquely():
+    for registry in (
+        smolux.kernels.KERNELS,
+        smolux.processes.PROCESSES,
+        smolux.weighting.WEIGHTINGS,
+        smolux.methods.METHODS,
+    ):
+        names = [entry.name for entry in registry]
+        assert len(set(names)) == len(names) > 0
+        # what case files write
+        assert all(name == name.lower() and " " not in name for name in names)
