@@ -88,7 +88,8 @@ def make_plan(
     }
     if population not in POPULATIONS:
         problems.append(
-            f"population = {population!r}: unknown{did_you_mean(str(population), list(POPULATIONS))}"
+            f"population = {population!r}: unknown"
+            + did_you_mean(str(population), list(POPULATIONS))
         )
     numbers = {
         "particles": _whole("particles", particles, 2, problems),
