@@ -81,7 +81,7 @@ _loops: dict[tuple[Any, ...], Any] = {}
 
 def loop_for(model: Model, method: Method, weighting: Weighting) -> Any:
     """Return the compiled loop, the same object for the same physics and method."""
-    rate = type(model.kernel).rate if "rate" not in vars(model.kernel) else model.kernel.rate
+    rate = model.kernel.rate
     outcomes = [type(process).outcome for process in model.processes]
     factors = [process.factor.rate for process in model.processes]
     key = (type(method), type(weighting), *map(digest, (rate, *outcomes, *factors)))
