@@ -283,7 +283,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         what = "is a folder" if file.is_dir() else "there is no such file"
         raise InputError(f"path = {str(path)!r}: {what}; name a results file such as results.nc")
     try:
-        ds = xr.load_dataset(file, engine="h5netcdf", decode_times=False, decode_timedelta=False)
+        ds = xr.load_dataset(file, engine="h5netcdf", decode_times=False)
     except PermissionError:
         raise
     except (OSError, ValueError, KeyError, RuntimeError) as error:

@@ -44,7 +44,7 @@ def test_round_trip_is_bit_for_bit(ds, tmp_path):
 
 def test_second_round_trip_and_units_of_time(tmp_path):
     # a time in seconds must stay a number
-    records = synthetic.constant_kernel(particles=50, replicas=1, units={"time": "s"})
+    records = synthetic.constant_kernel(particles=50, replicas=1, units={"time": "seconds"})
     ds = results.to_dataset(synthetic.model(), records)
     once = results.load(results.save(ds, tmp_path / "a.nc"))
     twice = results.load(results.save(once, tmp_path / "b.nc"))
