@@ -32,7 +32,7 @@ from ..core.state import (
     WORST_J,
     State,
 )
-from .base import Int, Method, Rates, enlarged
+from .base import Int, Method, Rates, enlarged, spread
 
 #: candidates looked at before the loop may return without an event
 _PATIENCE = 4096
@@ -267,7 +267,7 @@ class AcceptanceRejection(Method):
         array = np.zeros((len(populations), capacity + 8), np.int64)
         for r, (sizes, counts) in enumerate(populations):
             above = sizes > 1
-            array[r, : stored[r]] = np.repeat(sizes[above], counts[above])
+            spread(sizes[above], counts[above], array[r, : stored[r]])
             count = state.count[r]
             count[MONOMERS] = counts[~above].sum()
             count[STORED], count[PARTICLES] = stored[r], counts.sum()

@@ -93,6 +93,14 @@ class Method:
         raise NotImplementedError
 
 
+def spread(sizes: Int, counts: Int, out: Int) -> None:
+    """Write every size as often as it counts, in batches: `numpy.repeat` would hold all twice."""
+    ends = np.cumsum(counts)
+    for start in range(0, len(out), 1 << 20):
+        places = np.arange(start, min(start + (1 << 20), len(out)))
+        out[places[0] : places[-1] + 1] = sizes[np.searchsorted(ends, places, side="right")]
+
+
 def enlarged(array: NDArray[Any], capacity: int) -> NDArray[Any]:
     """Return a copy whose last axis has a larger capacity."""
     new = np.zeros((*array.shape[:-1], capacity), array.dtype)

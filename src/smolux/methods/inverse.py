@@ -28,7 +28,7 @@ from ..core.state import (
 )
 from ..core.sums import BLOCK, find, find_large, shift, weigh
 from ..errors import InputError
-from .base import Int, Method, Rates, enlarged
+from .base import Int, Method, Rates, enlarged, spread
 
 #: events after which the sums are computed afresh, so that rounding does not pile up
 _REFRESH = 1 << 16
@@ -376,7 +376,7 @@ class Inverse(Method):
         for r, (sizes, counts) in enumerate(populations):
             above = sizes > buckets
             number[r, sizes[~above] - 1] = counts[~above]
-            large[r, : stored[r]] = np.repeat(sizes[above], counts[above])
+            spread(sizes[above], counts[above], large[r, : stored[r]])
             count = state.count[r]
             count[STORED], count[PARTICLES], count[LARGEST] = stored[r], counts.sum(), sizes[-1]
         return Work(
