@@ -208,7 +208,7 @@ def test_shattering_of_three() -> None:
     assert states == [(3,), (2, 1), (1, 1, 1)]
     np.testing.assert_allclose(found[::-1], p, atol=1e-15)
     # collisions per time: 3 (1 + lam) from 111, (1 + lam) from 21
-    times = np.linspace(0, 0.8, 801)
+    times = np.linspace(0, 0.8, 161)
     rate = [(3 * x[0] + x[1]) * (1 + lam) for x in (expm(q * s) @ start for s in times)]
     mean, variance = finite.collision_moments(lambda i, j: 1.0, 3, 0.8, 1.0, lam)
     assert mean == pytest.approx(np.trapezoid(rate, times), rel=1e-5)
