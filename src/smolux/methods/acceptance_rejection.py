@@ -284,13 +284,19 @@ class AcceptanceRejection(Method):
         return work._replace(sizes=enlarged(work.sizes, 2 * work.sizes.shape[1]))
 
     def supply_bound(self, work: Work, rates: Rates, state: State, replica: int) -> None:
-        """See `Method.supply_bound`; bounds for half an octave more are computed with it."""
+        """See `Method.supply_bound`; bounds for half an octave are computed together.
+
+        They come in fixed blocks: a bound must not depend on which replica asked first.
+        """
         count = state.count[replica]
         low, high = (int(level_of.py_func(work.edges, count[k])) for k in (SMALLEST, LARGEST))
-        last = min(high + 4, work.majorant.shape[1])
-        top = (work.edges[high + 1 : last + 1] - 1).astype(float)
+        if not np.isnan(work.majorant[low, high]):  # another replica has asked for it
+            return
+        block = high - high % 4
+        highs = np.arange(max(low, block), min(block + 4, work.majorant.shape[1]))
+        top = (work.edges[highs + 1] - 1).astype(float)
         bottom = np.full(top.shape, float(work.edges[low]))
-        work.majorant[low, high:last] = rates.bounds(bottom, top, bottom, top)[1]
+        work.majorant[low, highs] = rates.bounds(bottom, top, bottom, top)[1]
 
     def population(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
         """See `Method.population`."""
