@@ -227,3 +227,12 @@ def test_results_that_stopped_are_compared_as_far_as_they_go():
     for name in ("number_density", "moment", "n", "n_bin"):
         ds[name][10:, 3:] = np.nan
     assert analysis.compare(ds, "exact").attrs["agree"] == 1
+
+
+def test_table_leaves_out_what_is_not_known():
+    ds = to_dataset(sx.Model(kernel=sx.kernels.Ballistic()), synthetic.constant_kernel())
+    (_, rows), *_ = analysis.tables(sx.summary(ds))
+    assert rows[0] == ("time", "mean", "95 %")
+    (_, rows), *_ = analysis.tables(sx.summary(ds.isel(replica=[0])))
+    assert rows[0] == ("time", "value")
+    assert {len(row) for row in rows} == {2}

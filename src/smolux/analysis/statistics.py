@@ -154,5 +154,5 @@ def joint_test(z: Float, rows: Float) -> tuple[float, float, float]:
     eigenvalues = np.linalg.eigvalsh(rows @ rows.T)
     squares, cubes = float(np.sum(eigenvalues**2)), float(np.sum(eigenvalues**3))
     f = squares**3 / cubes**2
-    x = (float(np.sum(z**2)) - len(z)) * np.sqrt(f / squares) + f
+    x = (float(np.sum(z**2)) - len(z)) * float(np.sqrt(f / squares)) + f
     return float(stats.chi2.sf(x, f)), x, f

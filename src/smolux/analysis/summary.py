@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from smolux.errors import InputError
 
 from .reference import exact_dataset, is_deterministic
-from .statistics import deviation, over_replicas, quantile
+from .statistics import ROUNDING, deviation, over_replicas, quantile
 
 Float = NDArray[np.float64]
 
@@ -57,6 +57,8 @@ def _of_variable(ds: xr.Dataset, exact: xr.Dataset | None, name: str) -> xr.Data
     variable = ds[name].transpose("replica", ...)
     dims = [str(d) for d in variable.dims[1:]]
     count, mean, error = over_replicas(variable.values)
+    # a spread of the last digits is none
+    error = np.where(error <= ROUNDING * np.abs(mean), 0.0, error)
     if name == "n":
         # zero in every replica is no proof that there are none
         error = np.where(mean == 0, np.nan, error)

@@ -10,10 +10,6 @@ import xarray as xr
 
 from smolux.errors import InputError, did_you_mean
 
-#: with replicas, and without any scatter
-_HEADER = ("time", "mean", "95 %", "exact", "sigmas")
-_BARE = ("time", "value", "exact", "relative difference")
-
 
 def _number(value: float, digits: int) -> str:
     return f"{value:.{digits}g}" if isfinite(value) else "-" if value != value else f"{value:g}"
@@ -30,20 +26,23 @@ def _pair(mean: float, half: float) -> tuple[str, str]:
 
 
 def _rows(variable: xr.DataArray) -> list[tuple[str, ...]]:
-    """Header and rows of one table."""
+    """Header and rows of one table; columns of which nothing is known are left out."""
     column = {str(k): variable.sel(statistic=k).values for k in variable["statistic"].values}
     scatter = bool(np.any(np.isfinite(column["standard_error"])))
-    rows: list[tuple[str, ...]] = [_HEADER if scatter else _BARE]
+    known = bool(np.any(~np.isnan(column["exact"])))
+    header = ["time", "mean", "95 %"] if scatter else ["time", "value"]
+    if known:
+        header += ["exact", "sigmas" if scatter else "relative difference"]
+    rows = [tuple(header)]
     for t, time in enumerate(variable["time"].values):
         mean, exact = float(column["mean"][t]), float(column["exact"][t])
-        first, last = _number(float(time), 6), _number(exact, 6)
-        if scatter:
-            half = float(column["upper"][t]) - mean
-            sigmas = _number(float(column["sigmas"][t]), 2)
-            rows.append((first, *_pair(mean, half), last, sigmas))
-        else:
+        half = float(column["upper"][t]) - mean
+        row = [_number(float(time), 6), *_pair(mean, half)[: 2 if scatter else 1]]
+        if known:
             relative = (mean - exact) / abs(exact) if exact else nan
-            rows.append((first, _number(mean, 6), last, _number(relative, 2)))
+            last = float(column["sigmas"][t]) if scatter else relative
+            row += [_number(exact, 6), _number(last, 2)]
+        rows.append(tuple(row))
     return rows
 
 
@@ -77,7 +76,9 @@ def tables(
     Returns
     -------
     list of (str, list of tuple of str)
-        A title and rows for each quantity; the first row is the header.
+        A title and rows for each quantity; the first row is the header: time, mean, 95 %, exact
+        and sigmas. Without any scatter (a solver, a single replica) the columns are time, value,
+        exact and relative difference. Without an exact solution the last two are left out.
 
     Raises
     ------
@@ -106,8 +107,7 @@ def format_table(summary: xr.Dataset, variables: Sequence[str] | None = None) ->
     Returns
     -------
     str
-        A dash stands for what is not known. Without any scatter (a solver, a single replica) the
-        columns are time, value, exact and relative difference.
+        A dash stands for what is not known. For the columns see `tables`.
 
     Raises
     ------

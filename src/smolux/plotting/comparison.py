@@ -125,15 +125,17 @@ def comparison(
         draw_reference(top, first, solution_of(first), variable, log_time, "black", **which)
         handles.append(Line2D([], [], color="black", label="exact"))
     # points lie on top of each other: the earlier ones are larger and open
+    simulated = [label for label, ds in results.items() if not is_deterministic(ds)]
     looks = {
-        label: replace(Look.number(k), hollow=k < len(results) - 1)
+        label: replace(Look.number(k), hollow=label in simulated[:-1])
         for k, label in enumerate(results)
     }
     if name in results and is_deterministic(results[name]):
         looks[name] = Look("black", "o")
-    for k, (label, ds) in enumerate(results.items()):
+    for label, ds in results.items():
         layer = 2 if is_deterministic(ds) else 3
-        ring = {"ms": 3.2 + 1.8 * (len(results) - 1 - k)} if layer == 3 else {}
+        later = len(simulated) - 1 - simulated.index(label) if layer == 3 else 0
+        ring = {"ms": 3.2 + 1.8 * later} if later else {}
         draw(top, ds, ds["time"].values, curves[label].values, looks[label], zorder=layer, **ring)
         handles.append(handle(ds, label, looks[label]))
     others = [label for label in results if label != name]

@@ -23,6 +23,8 @@ Reference = xr.Dataset | Literal["exact"] | None
 
 #: more points than this are drawn as a line with a shaded band
 _CROWDED = 40
+#: fewer points of a solver than this make no smooth line
+_FEW = 25
 
 
 @dataclass(frozen=True)
@@ -87,10 +89,18 @@ def draw_line(ax: Axes, x: Float, y: Float, colour: str, style: str = "-", **opt
     ax.plot(np.where(shown, x, np.nan), np.where(shown, y, np.nan), style, color=colour, **options)
 
 
+def draw_solver(ax: Axes, t: Float, y: Float, colour: str, **options: Any) -> None:
+    """Draw a solver's time series: a line, and where its points are few, they are shown on it."""
+    few = int(np.isfinite(y).sum()) < _FEW
+    draw_line(
+        ax, t, y, colour, ".-" if few else "-", **{"ms": 3.0, "lw": 0.7 if few else 1.0} | options
+    )
+
+
 def draw(ax: Axes, ds: xr.Dataset, x: Float, values: Float, look: Look, **options: Any) -> None:
     """Draw values of shape (R, P) of a result: simulated ones as dots, others as a line."""
     if is_deterministic(ds):
-        draw_line(ax, x, values[0], look.colour, **options)
+        draw_solver(ax, x, values[0], look.colour, **options)
     else:
         draw_values(ax, x, values, look, **options)
 

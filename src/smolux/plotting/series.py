@@ -25,6 +25,7 @@ from .curves import (
     described,
     draw,
     draw_line,
+    draw_solver,
     fine_times,
     handle,
     resolve,
@@ -112,7 +113,9 @@ def draw_reference(
     else:
         times = fine_times(ds, log_time)
         values = _exact_values(ds, reference, times, variable, which)
-    if crowded(ds):
+    if isinstance(reference, xr.Dataset) and not crowded(ds):
+        draw_solver(ax, times, values, colour, zorder=1)
+    elif crowded(ds):
         draw_line(ax, times, values, "black", "--", lw=0.8, zorder=4)
     else:
         draw_line(ax, times, values, colour, zorder=1)
