@@ -84,6 +84,9 @@ def test_nothing_seen_is_no_proof_of_nothing():
     assert float(table.sel(statistic="mean")) == 0
     assert float(table.sel(statistic="exact")) > 0
     assert np.isnan(table.sel(statistic=["lower", "upper", "sigmas"])).all()
+    # at the start nothing is left to chance
+    start = summary["n"].sel(size=50, time=0.0, statistic=["lower", "upper", "sigmas"])
+    assert np.all(start == 0)
 
 
 def test_replicas_that_did_not_reach_the_end():

@@ -181,6 +181,15 @@ def test_zero_counts_are_left_out_and_bars_to_zero_reach_the_edge():
     assert ax.get_ylim()[0] > 0
 
 
+def test_equal_counts_are_no_certainty():
+    ds = synthetic.constant_dataset(particles=500, times=(1.0,), replicas=2)
+    ds["n"][:, 0, 4] = 0.01
+    ax = plotting.size_distribution(ds, reference=None).axes[0]
+    assert 5 not in bars(ax)[0][0]
+    (open_one,) = [line for line in ax.lines if line.get_markerfacecolor() == "white"]
+    assert 5 in open_one.get_xdata()
+
+
 def test_classes_hold_all_clusters_and_join_sizes_and_bins(solved):
     table = Classes.of(solved, 8)
     assert np.array_equal(table.lower[1:], table.upper[:-1])

@@ -60,8 +60,10 @@ def _of_variable(ds: xr.Dataset, exact: xr.Dataset | None, name: str) -> xr.Data
     # a spread of the last digits is none
     error = np.where(error <= ROUNDING * np.abs(mean), 0.0, error)
     if name == "n":
-        # zero in every replica is no proof that there are none
-        error = np.where(mean == 0, np.nan, error)
+        # the same count in every replica, above all zero, is luck and no proof of certainty, unless
+        # nothing has happened yet
+        moved = (ds["collisions"].max("replica") != 0).values
+        error = np.where((error == 0) & moved[:, None], np.nan, error)
     half = quantile(count) * error
     known = np.full(mean.shape, np.nan)
     if exact is not None:

@@ -41,7 +41,9 @@ class Look:
         return cls(PALETTE[k % len(PALETTE)], MARKERS[k % len(MARKERS)])
 
 
-def draw_values(ax: Axes, x: Float, values: Float, look: Look, **options: Any) -> None:
+def draw_values(
+    ax: Axes, x: Float, values: Float, look: Look, *, counts: bool = False, **options: Any
+) -> None:
     """Draw the mean of simulated replicas with 95 % intervals by Student's t.
 
     Parameters
@@ -53,10 +55,13 @@ def draw_values(ax: Axes, x: Float, values: Float, look: Look, **options: Any) -
         logarithmic axis and are left out there; a bar that reaches the lower edge of such an axis
         stands for an interval that contains zero. Without any scatter the marker is open.
     look : Look
+    counts : bool
+        Whether the values are counts: if all replicas have the same, that is luck, not certainty.
     **options
         For the markers, such as ``zorder``.
     """
     count, mean, error = over_replicas(values)
+    error = np.where(error == 0, np.nan, error) if counts else error
     draw_points(ax, x, mean, quantile(count) * error, look, **options)
 
 

@@ -216,7 +216,7 @@ def size_distribution(
         if is_deterministic(ds):
             _line(ax, ds, time, look.colour)
         else:
-            draw_values(ax, table.positions(), table.density, look, zorder=3)
+            draw_values(ax, table.positions(), table.density, look, counts=True, zorder=3)
         handles.append(handle(ds, time_label(float(ds["time"].values[time])), look))
     ax.set_xlim(0.8, 1.3 * largest)
     ax.set_ylim(bottom / 3, 3 * top)

@@ -78,7 +78,7 @@ def scaling(
         if is_deterministic(ds):
             draw_line(ax, x, phi[0], look.colour)
         else:
-            draw_values(ax, x, phi, look, zorder=3)
+            draw_values(ax, x, phi, look, counts=True, zorder=3)
         mean = over_replicas(phi)[1]
         shown.append(np.stack([x, mean])[:, mean > 0])
         handles.append(handle(ds, time_label(float(ds["time"].values[time])), look))
