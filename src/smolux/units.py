@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from .errors import InputError
 
 
@@ -106,7 +108,15 @@ def parse_any(text: str) -> float:
 
 def text(value: float, dimension: Dimension) -> str:
     """Write an SI value so that `parse` gives it back exactly."""
-    return f"{value!r} {dimension.unit}"
+    return f"{shortest(value)} {dimension.unit}"
+
+
+def shortest(value: float) -> str:
+    """Write a float with the fewest signs that read back to it: ``1e+13``, not fourteen digits."""
+    plain = repr(value)
+    if len(plain) < 9 or not math.isfinite(value):
+        return plain
+    return min(plain, np.format_float_scientific(value, trim="-"), key=len)
 
 
 @cache

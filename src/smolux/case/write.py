@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..units import shortest
+
 _BARE = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 _ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
@@ -60,7 +62,7 @@ def value(content: Any) -> str:
     if isinstance(content, str):
         return _string(content)
     if isinstance(content, (int, float)):
-        return repr(content)
+        return repr(content) if isinstance(content, int) else shortest(content)
     if isinstance(content, Mapping):
         return "{ " + ", ".join(f"{_key(k)} = {value(v)}" for k, v in content.items()) + " }"
     parts = [value(v) for v in content]

@@ -34,15 +34,15 @@ def _parameters(law: type[Kernel]) -> str:
 
 
 def overview() -> list[tuple[str, ...]]:
-    """Rows of the table of kernels: name, formula over scale, example, degree, gels, exact."""
+    """Rows of the table of kernels: name, degree, gels, exact, formula without its prefactor."""
     return [
         (
             law.name,
-            law.formula.removeprefix("scale * ").replace("scale", "1"),
-            _parameters(law),
             _degree(law),
             _gels(law),
             "yes" if law.exact else "no",
+            law.formula.removeprefix("scale * ").replace("scale", "1")
+            + (f"   [{_parameters(law)}]" if law.example else ""),
         )
         for law in KERNELS
     ]

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from ..case import Case
+from ..case.physics import model_tables
+from ..case.write import value
 from ..errors import InputError
 from .console import amount, duration
 from .estimate import cores, estimate, negative_rates, physics_warnings
@@ -41,11 +46,12 @@ def description(case: Case) -> list[str]:
     processes = ", ".join(
         p.name + ("" if p.factor.constant == 1 else f" ({p.factor.text})") for p in model.processes
     )
+    tables = model_tables(model, case.si)
     lines = [f"title        {case.title}"] if case.title else []
     lines += [
-        f"kernel       {model.kernel!r}",
+        f"kernel       {_words(tables['kernel'])}",
         f"processes    {processes}",
-        f"initial      {model.initial!r}",
+        f"initial      {_words(tables['initial'])}",
         f"times        {len(case.times)}, up to {case.times[-1]:g}{t}",
     ]
     if case.run is not None:
@@ -57,3 +63,9 @@ def description(case: Case) -> list[str]:
     if case.solve is not None:
         lines.append(f"solve        {case.solve.method}, tolerance {case.solve.tolerance:g}")
     return lines
+
+
+def _words(table: Mapping[str, Any]) -> str:
+    """Write a table of the case in a line."""
+    name = [str(table["name"])] if "name" in table else []
+    return ", ".join([*name, *(f"{k} = {value(v)}" for k, v in table.items() if k != "name")])

@@ -12,24 +12,27 @@ if TYPE_CHECKING:
 _WIDTH = 100
 
 
-def _console(stderr: bool) -> Console:
+def console(stderr: bool = False, terminal: bool | None = None) -> Console:
+    """Return a console on standard output or standard error.
+
+    Parameters
+    ----------
+    stderr : bool
+        For progress and remarks; standard output is for what was asked for.
+    terminal : bool, optional
+        Whether it is a terminal; found out if left out.
+    """
     import sys
 
     from rich.console import Console
 
+    class Patient(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError  # which is no error of ours, see `guard`
+
     stream = sys.stderr if stderr else sys.stdout
     width = None if stream.isatty() else _WIDTH
-    return Console(file=stream, width=width, highlight=False, soft_wrap=False)
-
-
-def out() -> Console:
-    """Console for what was asked for."""
-    return _console(False)
-
-
-def err() -> Console:
-    """Console for progress and remarks."""
-    return _console(True)
+    return Patient(file=stream, width=width, highlight=False, force_terminal=terminal)
 
 
 def say(*lines: str) -> None:
@@ -56,10 +59,12 @@ def table(
         pad_edge=False,
     )  # fmt: skip
     for n, name in enumerate(header):
-        grid.add_column(name, justify="left" if n in left else "right", overflow="fold")
+        grid.add_column(
+            name, justify="left" if n in left else "right", overflow="fold", no_wrap=n == 0
+        )
     for row in rows:
         grid.add_row(*map(Text, row))
-    out().print(grid)
+    console().print(grid)
 
 
 def number(value: float, digits: int = 4) -> str:
@@ -71,9 +76,9 @@ def duration(seconds: float) -> str:
     """Write a stretch of wall time: ``"3.2 s"``, ``"4 min 10 s"``, ``"2 h 5 min"``."""
     if not seconds < 1e9:
         return "unknown"
-    if seconds < 60:
-        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
     whole = round(seconds)
+    if whole < 60:
+        return f"{seconds:.2g} s" if seconds < 9.95 else f"{whole} s"
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
     if whole < 48 * 3600:

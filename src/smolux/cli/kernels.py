@@ -17,12 +17,13 @@ def kernels(
         typer.echo(catalogue.details(name))
         return
     console.table(
-        ("name", "K(i, j) / scale", "example", "degree", "gels", "exact"),
+        ("name", "degree", "gels", "exact", "K(i, j) / scale"),
         catalogue.overview(),
-        left=(0, 1, 2, 4, 5),
+        left=(0, 2, 3, 4),
     )
     typer.echo(
-        "Any other law: a formula in the case file (smolux new NAME --template "
-        "custom-formula-kernel),\nor a Python function (smolux.kernels.from_function). "
-        "Details of one: smolux kernels brownian"
+        "Degree and gelation are those of the parameters in brackets, and of monomers of\n"
+        "unit density. Details of one: smolux kernels brownian\n"
+        "Any other law: a formula in the case file (smolux new NAME -t\n"
+        "custom-formula-kernel), or a Python function (smolux.kernels.from_function)."
     )

@@ -111,7 +111,7 @@ class Display:
         from rich.progress import BarColumn, TaskProgressColumn, TextColumn
         from rich.progress import Progress as Bar
 
-        from .console import err
+        from .console import console
 
         self._bar = Bar(
             TextColumn("{task.description}"),
@@ -119,7 +119,7 @@ class Display:
             TaskProgressColumn(),
             TextColumn("{task.fields[rate]}"),
             TextColumn("{task.fields[left]}"),
-            console=err(),
+            console=console(True, self.terminal),
             transient=True,
         )
         first = "compiling" if self.what == "simulating" else self.what

@@ -125,8 +125,13 @@ def _simulate(
 ) -> Any:
     run = case.run
     assert run is not None
-    stopper.patient = True
-    with display(check=stopper.check) as progress:
+
+    def check() -> None:
+        # from the first call on there is something to lose
+        stopper.patient = True
+        stopper.check()
+
+    with display(check=check) as progress:
         settings: dict[str, Any] = {
             "progress": progress,
             "checkpoint_every": run.checkpoint_every,
@@ -140,9 +145,11 @@ def _simulate(
                     case.model, checkpoint=directory.checkpoint, **_arguments(case), **settings
                 )
         except Interrupted as stop:
+            stopper.patient = True
             _store(stop.dataset, case, directory.results)
             share = f", {100 * progress.last.fraction:.0f} % done" if progress.last else ""
             raise Interrupted(f"{str(stop).partition(';')[0]}{share}") from None
+        stopper.patient = True
     _store(ds, case, directory.results)
     say(
         f"simulated in {duration(float(ds.attrs['wall_seconds']))}"

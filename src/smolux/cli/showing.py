@@ -103,9 +103,10 @@ def mass(ds: Any) -> str:
     """Say how well the mass is conserved; nothing if it was not observed."""
     if 1 not in ds["order"].values:
         return ""
-    m1 = ds["moment"].sel(order=1).values
-    if not np.isfinite(m1).any():
+    m1 = ds["moment"].sel(order=1).transpose("replica", "time").values
+    m1 = m1[np.isfinite(m1[:, 0])]  # replicas that were begun
+    if not m1.size:
         return ""
-    spread = (np.nanmax(m1) - np.nanmin(m1)) / np.nanmean(m1)
+    spread = float(np.max((np.nanmax(m1, axis=1) - np.nanmin(m1, axis=1)) / m1[:, 0]))
     words = "to rounding" if spread < 1e-12 else f"to {spread:.1e}"
     return f"Mass M1 = {np.nanmean(m1):.6g}, constant {words}."

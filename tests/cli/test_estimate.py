@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import smolux
+from smolux.case import parse
+from smolux.cli import checking, estimate
+from smolux.errors import InputError
+
+
+def case(kernel: str, run: str = "times = [2]", rest: str = ""):
+    return parse(f"[kernel]\n{kernel}\n{rest}\n[run]\n{run}\nseed = 1\n")
+
+
+# --- gelation ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("density", "scale", "end", "time"),
+    [(1, 1, 2, 1.0), (4, 1, 2, 0.25), (1, 0.5, 3, 2.0), (0.1, 1, 2, None), (1, 1, 0.9, None)],
+)
+def test_the_gel_time_is_scaled_by_density_and_prefactor(density, scale, end, time):
+    found = estimate.physics_warnings(
+        case(
+            f'name = "multiplicative"\nscale = {scale}', f"times = [{end}]",
+            f"[initial]\ndensity = {density}",
+        )
+    )  # fmt: skip
+    if time is None:
+        assert found == []
+    else:
+        (warning,) = found
+        assert warning.startswith(f"gelation at t = {time:.4g}, before the end at {end}")
+
+
+def test_other_starts_and_unknown_kernels():
+    (warning,) = estimate.physics_warnings(
+        case('name = "multiplicative"', rest='[initial]\nname = "exponential"\nmean = 5')
+    )
+    assert "sooner" in warning
+    (warning,) = estimate.physics_warnings(case('formula = "i*j"\ndegree = 2'))
+    assert "may gel" in warning
+    (warning,) = estimate.physics_warnings(case('formula = "i*j"\ngels = true'))
+    assert "at a time that is not known" in warning
+    assert estimate.physics_warnings(case('name = "constant"')) == []
+
+
+def test_what_breaks_clusters_up_may_prevent_a_gel():
+    text = '[[processes]]\nname = "aggregation"\n[[processes]]\nname = "shattering"\nrate = 0.1\n'
+    assert estimate.physics_warnings(case('name = "multiplicative"', rest=text)) == []
+
+
+# --- mistakes that only the whole case shows -----------------------------------------------------
+
+
+def test_rates_that_fall_below_zero_are_found_before_the_run():
+    text = (
+        '[[processes]]\nname = "aggregation"\n[[processes]]\nname = "shattering"\n'
+        'rate = "0.01*(1 - t/400)"\n'
+    )
+    fine = case('name = "constant"', "times = [399]", text)
+    assert estimate.negative_rates(fine) == []
+    with pytest.raises(InputError, match=r"at t = 400\.\d+; it must be"):
+        checking.text(case('name = "constant"', "times = [500]", text), "case.toml")
+
+
+# --- cost ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("population", ["doubling", "fixed-volume"])
+def test_the_number_of_collisions_is_about_right(population):
+    rest = '[[processes]]\nname = "aggregation"\n[[processes]]\nname = "shattering"\nrate = 0.1\n'
+    given = case(
+        'name = "constant"',
+        f'times = [30]\nparticles = 40000\nreplicas = 2\npopulation = "{population}"',
+        rest,
+    )
+    cost = estimate.estimate(given)
+    ds = smolux.simulate(
+        given.model, [30], particles=40_000, replicas=2, seed=5, population=population
+    )
+    assert cost.collisions == pytest.approx(float(ds.attrs["events"]), rel=0.1)
+    assert 0 < cost.seconds < 60
+    assert cost.output > ds.nbytes * 0.5
+    assert cost.output < 3 * ds.nbytes
+    assert cost.memory > 8 * 2 * 40_000
+
+
+def test_extinction_is_foreseen():
+    run = 'times = [5000]\nparticles = 1000\npopulation = "fixed-volume"'
+    (warning,) = estimate.estimate(case('name = "constant"', run)).warnings
+    assert "everything becomes one cluster (extinction)" in warning
+    run = run.replace("5000", "50")
+    (warning,) = estimate.estimate(case('name = "constant"', run)).warnings
+    assert "about 38" in warning or "replicas may end as one cluster" in warning
+    assert estimate.estimate(case('name = "constant"', run.replace("1000", "1e5"))).warnings == []
+    assert (
+        estimate.estimate(
+            case('name = "constant"', run.replace("fixed-volume", "doubling"))
+        ).warnings
+        == []
+    )
+
+
+def test_one_replica_and_rare_sizes_are_told():
+    rest = '[initial]\nname = "sizes"\ndensities = { 1 = 1.0, 50 = 1e-4 }\n'
+    found = estimate.estimate(
+        case('name = "constant"', "times = [1]\nparticles = 1000\nreplicas = 1", rest)
+    ).warnings
+    assert len(found) == 2
+    assert "of size 50 there are fewer than 10" in found[0]
+    assert "one replica gives no error bars" in found[1]
+
+
+def test_a_pilot_that_does_not_reach_the_end_says_so(monkeypatch):
+    monkeypatch.setattr(estimate, "_LIMIT", 0.0)
+    small = estimate.pilot(case('name = "constant"', "times = [1e9]\nparticles = 1e6"))
+    if small.reached < 1:
+        assert "extrapolated" in estimate._pilot_warnings(small)[0]
+    assert np.isfinite(small.expected_collisions(case('name = "constant"').run))
