@@ -157,6 +157,12 @@ def test_gel_time_from_rate_equations():
         assert analysis.gelation(ds).attrs["gel_time"] == pytest.approx(gel_time, rel=0.01)
 
 
+def test_gel_time_from_a_few_times():
+    ds = synthetic.solver_dataset(times=[0.2, 0.4, 0.6, 0.8, 0.9])
+    ds["moment"].loc[{"order": 2.0}] = 1 / (1 - ds["time"].values)
+    assert analysis.gelation(ds).attrs["gel_time"] == pytest.approx(1, abs=0.03)
+
+
 def test_no_gel_where_none_is():
     late = synthetic.constant_dataset(particles=300, times=np.geomspace(0.1, 1e5, 40))
     assert np.isnan(analysis.gelation(late)["gel_time"]).all()

@@ -76,7 +76,7 @@ def _divergence(t: Float, m2: Float) -> float:
     middle = (t[1:stop] + t[: stop - 1]) / 2
     with np.errstate(divide="ignore"):
         inverse = np.diff(t[:stop]) / np.diff(np.log(m2[:stop]))
-    late = slice(max(len(inverse) - 6, len(inverse) // 2), None)
+    late = slice(-min(6, max(3, len(inverse) // 2)), None)
     x, y = middle[late], inverse[late]
     if len(x) < 3 or not np.all(np.isfinite(y)):
         return np.nan
