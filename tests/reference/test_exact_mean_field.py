@@ -8,7 +8,7 @@ import pickle
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 
 from smolux import exact
 from smolux.errors import InputError
@@ -225,6 +225,23 @@ class TestGelation:
         solution = exact.Bilinear(1.0, 1.0, *parameters)
         t = np.array([0.1, 0.4, 0.6])
         np.testing.assert_allclose(solution.moment(t, 0) * solution.moment(t / 2, 2), 1, rtol=1e-14)
+
+    @pytest.mark.parametrize(
+        ("a", "b", "t"), [(0.5, 0.25, 1.2), (0.3, 0.2, 1.5), (2.0, 1e-6, 2.5), (2.0, 0.1, 0.9)]
+    )
+    def test_bilinear_moments_by_their_equations(self, a: float, b: float, t: float) -> None:
+        def change(_: float, m: list[float]) -> list[float]:
+            m0, m2, m3 = m
+            return [
+                -0.5 * (m0 * m0 + 2 * a * m0 + b),
+                1 + 2 * a * m2 + b * m2 * m2,
+                3 * (m2 + a * (m3 + m2 * m2) + b * m2 * m3),
+            ]
+
+        end = solve_ivp(change, (0, t), [1.0, 1.0, 1.0], "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+        solution = exact.Bilinear(A=a, B=b)
+        found = [float(solution.moment(t, p)) for p in (0, 2, 3)]
+        np.testing.assert_allclose(found, end, rtol=1e-9)
 
     def test_bilinear_is_unknown_after_the_gel_time(self) -> None:
         solution = exact.Bilinear(A=0.5, B=0.25)

@@ -31,6 +31,8 @@ _SMALL = 0.1
 #: aliasing is exp(-_OVER * _DEPTH); rounding is magnified by exp(_DEPTH)
 _OVER, _DEPTH = 8, 4.5
 _CHUNK = 1 << 12
+#: sample points of the entire functions on the circle, twice the terms of their series
+_TERMS = 128
 
 
 def _taylor(
@@ -83,29 +85,43 @@ def _frobenius(
     )
 
 
-def _solve(z: Complex, lam: float, t: float) -> tuple[Complex, Complex]:
-    """Return ``w`` and ``theta w`` at the time `t`, up to a common factor above 0."""
+def _advance(z: Complex, lam: float, t: float) -> tuple[Complex, Complex, float, float]:
+    """Carry ``w`` and ``theta w`` by Taylor series, to the time `t` or to where x is small.
+
+    Returns
+    -------
+    w, p : ndarray of complex
+        Up to a common factor above 0: entire functions of `z`.
+    x, left : float
+        Where the series stopped, and ``lam`` times the time that is left.
+    """
     nu = 2 / (1 + 2 * lam)
-    drift = (1 + lam) * nu
     rho = z * (nu / 2)
     x, gap, left = 1 / (1 + 2 * lam), 2 * lam / (1 + 2 * lam), lam * t
     w, p = np.ones_like(z), z / (2 * lam)
     frequency = math.sqrt(float(np.max(np.abs(rho))))
-    while left > 0:
-        if x <= _SMALL and frequency < 5:
-            w, p = _frobenius(rho, w, p, x, left, drift)
-            break
+    while left > 0 and not (x <= _SMALL and frequency < 5):
         h = -min(0.45 * min(1.0, gap / x), 0.75, 2 * math.sqrt(gap) / frequency)
         if math.log1p(h) < -left:
             h = math.expm1(-left)
             left = 0.0
         else:
             left += math.log1p(h)
-        w, p = _taylor(rho, w, p, x, gap, h, drift)
-        scale = np.abs(w) + np.abs(p)
+        w, p = _taylor(rho, w, p, x, gap, h, (1 + lam) * nu)
+        scale = np.max(np.abs(w)) + np.max(np.abs(p))
         w, p = w / scale, p / scale
         x, gap = x * (1 + h), gap - x * h
-    return w, p
+    return w, p, x, left
+
+
+def _finish(
+    z: Complex, lam: float, w: Complex, p: Complex, x: float, left: float
+) -> tuple[Complex, Complex]:
+    """Carry ``w`` and ``theta w`` over what `_advance` left."""
+    if left == 0:
+        return w, p
+    nu = 2 / (1 + 2 * lam)
+    return _frobenius(z * (nu / 2), w, p, x, left, (1 + lam) * nu)
 
 
 def generating_function(z: Complex, lam: float, t: float) -> Complex:
@@ -125,7 +141,7 @@ def generating_function(z: Complex, lam: float, t: float) -> Complex:
     ndarray of complex
         Of the shape of `z`.
     """
-    w, p = _solve(z, lam, t)
+    w, p = _finish(z, lam, *_advance(z, lam, t))
     return 2 * lam * p / w
 
 
@@ -148,7 +164,8 @@ def radius(lam: float, t: float) -> float:
     # The poles of G, zeros of w, lie at excesses of about 1 : 4 : 9 : ...; w is positive at first.
     excess = np.geomspace(1e-9, 4 * (1 + 2 / t) / steady, 400)
     while True:
-        value = _solve((steady * (1 + excess)).astype(complex), lam, t)[0].real
+        z = (steady * (1 + excess)).astype(complex)
+        value = _finish(z, lam, *_advance(z, lam, t))[0].real
         beyond = np.flatnonzero(~(value > 0))
         first = int(beyond[0]) if beyond.size else excess.size - 1
         if first == 0:
@@ -176,15 +193,22 @@ def coefficients(lam: float, t: float, largest: int) -> Float:
     """
     circle = radius(lam, t) * math.exp(-_DEPTH / largest)
     points = _OVER * largest
-    angle = np.pi * (np.arange(points // 2) + 0.5) / (points // 2)
-    upper = np.concatenate(
-        [
-            generating_function(circle * np.exp(1j * part), lam, t)
-            for part in np.array_split(angle, max(1, angle.size // _CHUNK))
-        ]
+    # w and theta w as power series in z: few terms, evaluated at all points by a transform
+    w, p, x, left = _advance(circle * np.exp(2j * np.pi / _TERMS * np.arange(_TERMS)), lam, t)
+    j = np.arange(_TERMS // 2)
+    shift = np.exp(1j * np.pi / points * j)
+    w, p = (
+        np.fft.ifft(np.fft.fft(f)[: _TERMS // 2].real * shift, points)[: points // 2]
+        for f in (w, p)
     )
+    g = np.empty(points // 2, complex)
+    for start in range(0, g.size, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        angle = 2 * np.pi / points * (np.arange(start, min(start + _CHUNK, g.size)) + 0.5)
+        top, bottom = _finish(circle * np.exp(1j * angle), lam, w[part], p[part], x, left)[::-1]
+        g[part] = 2 * lam * top / bottom
     k = np.arange(largest + 1)
     # G at conjugate points is conjugate: the real part of the sum over the upper half
-    sums = np.fft.fft(upper, points)[: largest + 1]
+    sums = np.fft.fft(g, points)[: largest + 1]
     sums = 2 * (sums * np.exp(-1j * np.pi * k / points)).real / points
     return sums * np.exp(-k * math.log(circle))
