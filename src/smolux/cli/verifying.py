@@ -47,7 +47,7 @@ def run(methods: Sequence[str] | None, seed: int) -> bool:
 
 def _columns(*cells: str) -> str:
     law, measured, expected, p, verdict, seconds = cells
-    return f"{law:26}  {measured:>14}  {expected:>14}  {p:>5}  {verdict:6}  {seconds:>6}"
+    return f"{law:26}  {measured:>13}  {expected:>13}  {p:>5}  {verdict:6}  {seconds:>6}"
 
 
 HEADER = _columns("law", "measured", "exact", "p", "", "time")
@@ -61,5 +61,5 @@ def row(finding: Finding) -> str:
         finding.expected,
         f"{finding.p:.2g}",
         "passed" if finding.passed else "FAILED",
-        duration(finding.seconds),
+        f"{finding.seconds:.1f} s",
     )
