@@ -1,6 +1,17 @@
 """The same model by rate equations: `solve`, steady states and their stability."""
 
+from .hopf import HopfThreshold, hopf_threshold
 from .integrate import SolverError
 from .solve import Progress, solve
+from .steady import SteadyState, eigenvalues, steady_state
 
-__all__ = ["Progress", "SolverError", "solve"]
+__all__ = [
+    "HopfThreshold",
+    "Progress",
+    "SolverError",
+    "SteadyState",
+    "eigenvalues",
+    "hopf_threshold",
+    "solve",
+    "steady_state",
+]

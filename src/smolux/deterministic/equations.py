@@ -133,7 +133,7 @@ class Equations:
         return loss * near[0], gain * near[1]
 
     def _near(self, n: Float, enough: float) -> list[Float]:
-        """Return the loss rate by the first partners together, and by each; `enough` may be missing."""
+        """Return the loss by near partners, together and each; `enough` of it may be missing."""
         total = self.operator.loss(n[None, :])[0]
         most = min(_BANDS, self.largest)
 

@@ -47,8 +47,8 @@ class Operator(Protocol):
     def columns(self, count: int) -> Float:
         """Return ``K(i, j)`` for all i and ``j = 1 .. count``, shape (M, count)."""
 
-    def prepare(self, n: Float) -> None:
-        """Adapt to densities near `n`, shape (M,)."""
+    def prepare(self, n: Float | None) -> None:
+        """Adapt to densities near `n`, shape (M,), or to any."""
 
 
 class Direct:
@@ -115,8 +115,8 @@ class Direct:
         sizes = np.arange(1.0, self.largest + 1.0)
         return self.kernel(sizes[:, None], sizes[None, :count])
 
-    def prepare(self, n: Float) -> None:
-        """See `Operator.prepare`."""
+    def prepare(self, n: Float | None) -> None:
+        """See `Operator.prepare`; there is nothing to adapt."""
 
 
 class LowRank:
@@ -174,12 +174,15 @@ class LowRank:
         """See `Operator.columns`."""
         return self._gain.columns(count)
 
-    def prepare(self, n: Float) -> None:
+    def prepare(self, n: Float | None) -> None:
         """Choose the tilt for which the noise disturbs the moments of order 0 to 3 least.
 
         The noise of size k is ``exp(-theta k) sum_j n_j^2 exp(2 theta j)`` up to a factor. Its
         effect on the moments relative to them is a convex function of theta in the logarithm.
         """
+        if n is None:
+            self._tilt(0.0)
+            return
         m = self.largest
         k = np.unique(np.round(np.geomspace(1, m, 96)).astype(int))
         width = np.gradient(k.astype(float)) if len(k) > 1 else np.ones(1)
