@@ -412,4 +412,4 @@ class TestSmallOnes:
         solution = exact.ConstantShattering(lam=lam)
         np.testing.assert_allclose(solution.densities(10.0, k), n, rtol=1e-9)
         steady = solution.densities(math.inf, k)
-        assert np.abs(n / steady - 1).max() > 0.25  # the steady state is far at t = 10
+        assert (n / steady).max() > 3  # the steady state is far at t = 10
