@@ -95,7 +95,11 @@ def rates_for(model: Model, weighting: Weighting) -> Rates:
     """Return what a method needs to know of the simulated rate."""
     kernel = model.kernel
     return Rates(
-        kernel.parameters, weighting.arrays(kernel), weighting.bounds(kernel), kernel.cheap
+        kernel.parameters,
+        weighting.arrays(kernel),
+        weighting.bounds(kernel),
+        kernel.cheap,
+        kernel.rigorous,
     )
 
 

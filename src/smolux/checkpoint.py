@@ -83,7 +83,6 @@ def save(path: str | Path, plan: Plan, groups: Sequence[Group]) -> None:
         about.append(
             {
                 "first": group.first,
-                "warnings": group.warnings,
                 "seconds": group.seconds,
                 "populations": [len(replica) for replica in group.distribution],
             }
@@ -148,7 +147,6 @@ def _group(plan: Plan, k: int, about: dict[str, Any], arrays: dict[str, np.ndarr
         Tally(**part("tally")),
         arrays[f"{k}/codes"],
         Windows(**part("windows")),
-        warnings=list(about["warnings"]),
         distribution=distribution,
         seconds=about["seconds"],
     )

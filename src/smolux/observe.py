@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .core.state import DOUBLINGS, EXTINCT
+from .core.state import CLOCKS, DOUBLINGS, EXTINCT, FLOOR, REPAIRS, TRIALS, WORST_I, WORST_J
 from .plan import Plan
 from .records import Records
 from .replicas import Group
@@ -29,10 +29,10 @@ def to_records(plan: Plan, groups: Sequence[Group]) -> Records:
     used = int(np.max(np.nonzero(bins.any(axis=(0, 1)))[0], initial=-1)) + 1
     sizes = np.arange(1, plan.sizes + 1, dtype=float)
     weights = plan.weighting.stands_for(sizes)
-    per_volume = 1.0 / volume[..., None]  # NaN where missing, so that all that follows is too
-    n = counts * weights * per_volume
+    v = volume[..., None]  # NaN where missing, so that all that follows is too
+    stood = counts * weights
     sums = np.concatenate([g.tally.sums for g in groups])
-    moment = n @ (sizes[:, None] ** np.array(plan.orders)[None, :]) + sums * per_volume
+    powers = sizes[:, None] ** np.array(plan.orders)
     events = np.concatenate([g.tally.events for g in groups]).astype(float)
     events[missing] = np.nan
     clock = np.concatenate([g.state.clock for g in groups])
@@ -47,16 +47,16 @@ def to_records(plan: Plan, groups: Sequence[Group]) -> Records:
         particles=particles,
         collisions=collisions,
         volume=volume,
-        moment=moment,
-        n=n,
-        n_bin=bins[:, :, :used] * per_volume,
+        moment=(stood @ powers + sums) / v,  # whole numbers until here: the mass is exact
+        n=stood / v,
+        n_bin=bins[:, :, :used] / v,
         events=events,
         extinction_time=clock[:, EXTINCT],
         distribution=[rows for g in groups for rows in g.distribution]
         if plan.distribution
         else None,
         attributes=_attributes(plan, groups),
-        warnings=_warnings(groups, int(missing.any(axis=1).sum())),
+        warnings=_warnings(plan, groups, int(missing.any(axis=1).sum())),
     )
 
 
@@ -76,15 +76,33 @@ def _attributes(plan: Plan, groups: Sequence[Group]) -> dict[str, object]:
     }
 
 
-def _warnings(groups: Sequence[Group], unfinished: int) -> list[str]:
-    found = dict.fromkeys(text for g in groups for text in g.findings())
-    extinct = np.concatenate([g.state.clock[:, EXTINCT] for g in groups])
-    count = int(np.isfinite(extinct).sum())
-    if count:
-        found[
-            f"{count} of {len(extinct)} replicas ended as one cluster (extinction), the first at "
+def _warnings(plan: Plan, groups: Sequence[Group], unfinished: int) -> list[str]:
+    count = np.concatenate([g.state.count for g in groups])
+    clock = np.concatenate([g.state.clock for g in groups])
+    found = []
+    if count[:, REPAIRS].any():
+        i, j = count[clock[:, FLOOR].argmax(), [WORST_I, WORST_J]]
+        found.append(
+            f"the kernel was found above its bound {count[:, REPAIRS].sum()} times in "
+            f"{count[:, TRIALS].sum()} candidates, for example at the sizes {i} and {j}; the bound "
+            "was raised from there on. A kernel written as a formula, or bounds= of from_function "
+            "that hold, have no such error"
+        )
+    raised = clock[:, CLOCKS:] > 0
+    for process, replicas in zip(plan.model.processes, raised.sum(axis=0), strict=True):
+        if replicas:
+            found.append(
+                f"the rate of {process.name}, {process.factor.text}, was found above its sampled "
+                f"bound in {replicas} of {len(raised)} replicas; the bound was raised from there "
+                "on: a formula in t has proved bounds"
+            )
+    extinct = clock[:, EXTINCT]
+    ended = int(np.isfinite(extinct).sum())
+    if ended:
+        found.append(
+            f"{ended} of {len(extinct)} replicas ended as one cluster (extinction), the first at "
             f"t = {np.nanmin(extinct):.6g}: more particles, or population='doubling', put this off"
-        ] = None
+        )
     if unfinished:
-        found[f"{unfinished} replicas did not reach the last output time"] = None
-    return list(found)
+        found.append(f"{unfinished} replicas did not reach the last output time")
+    return found

@@ -17,17 +17,19 @@ from .core.state import (
     BAD_RATE,
     BOUND,
     BUDGET,
+    CLOCKS,
     DONE,
     DOUBLE_AT,
     EVENTS,
+    EXCESS,
     EXTINCT,
-    FLOOR,
     GROW,
     PAUSE,
     PAUSED,
+    PENDING,
     PROCESS,
-    REPAIRS,
     TIME,
+    TOO_LARGE,
     TRIALS,
     VALUE,
     VOLUME,
@@ -62,8 +64,6 @@ class Group:
     tally: Tally
     codes: Int
     windows: Any
-    #: what was reported, once each
-    warnings: list[str] = field(default_factory=list)
     distribution: list[list[tuple[Int, Int]]] = field(default_factory=list)
     seconds: float = 0.0
     compile_seconds: float = 0.0
@@ -164,9 +164,14 @@ class Group:
                 self._repair_factor(r)
             elif code == BAD_RATE:
                 raise InputError(_bad_rate(self.plan.model, self.state, r))
+            elif code == TOO_LARGE:
+                raise InputError(
+                    "a cluster would reach 2**62 monomers, more than can be counted, near "
+                    f"t = {self.state.clock[r, TIME]:.6g}: end earlier"
+                )
 
     def _repair_factor(self, r: int) -> None:
-        """Raise the bound of a factor that was found above it."""
+        """Raise the bounds of a factor that was found above one; the event itself takes place."""
         process = int(self.state.count[r, PROCESS])
         value, window = float(self.state.clock[r, VALUE]), int(self.state.count[r, WINDOW])
         name, text = (
@@ -175,33 +180,13 @@ class Group:
         )
         if not (np.isfinite(value) and value >= 0):
             raise InputError(
-                f"the rate of {name}, {text}, is {value:.6g} near "
-                f"t = {self.state.clock[r, TIME]:.6g}; it must be a finite number, zero or more"
+                f"the rate of {name}, {text}, is {value:.6g} at "
+                f"t = {self.state.clock[r, PENDING]:.6g}; it must be a finite number, zero or more"
             )
-        self.windows.bounds[window, process] = max(
-            1.1 * value, self.windows.bounds[window, process]
-        )
-        self.windows.total[:] = self.windows.bounds.sum(axis=1)
-        self.warnings.append(
-            f"the rate of {name}, {text}, was found above its sampled bound near "
-            f"t = {self.state.clock[r, TIME]:.6g}; the bound was raised: a formula has proved "
-            "bounds"
-        )
-
-    def findings(self) -> list[str]:
-        """Return all warnings, those of repaired rate bounds included."""
-        count = self.state.count
-        found = list(dict.fromkeys(self.warnings))
-        if count[:, REPAIRS].any():
-            worst = int(np.argmax(self.state.clock[:, FLOOR]))
-            i, j = count[worst, WORST_I], count[worst, WORST_J]
-            found.append(
-                f"the kernel was found above its bound {count[:, REPAIRS].sum()} times in "
-                f"{count[:, TRIALS].sum()} candidates, last at sizes ({i}, {j}); the bound was "
-                "raised from there on. A kernel written as a formula, or bounds= of from_function "
-                "that hold, have no such error"
-            )
-        return found
+        # for this replica alone: what others do must not depend on when this one came here
+        clock = self.state.clock[r]
+        clock[CLOCKS + process] = 1.1 * value - self.windows.bounds[window, process]
+        clock[EXCESS] = clock[CLOCKS:].sum()
 
 
 def _population(plan: Plan, replica: int) -> tuple[Int, Int]:
@@ -215,7 +200,7 @@ def _population(plan: Plan, replica: int) -> tuple[Int, Int]:
 def _bad_rate(model: Model, state: State, r: int) -> str:
     i, j = int(state.count[r, WORST_I]), int(state.count[r, WORST_J])
     return (
-        f"the kernel {model.kernel.name!r} gave {state.clock[r, VALUE]:.6g} for the sizes "
+        f"the kernel {model.kernel.label} gave {state.clock[r, VALUE]:.6g} for the sizes "
         f"{i} and {j}, met at t = {state.clock[r, TIME]:.6g}; a rate must be a finite number, "
         "zero or more: correct the function for these sizes"
     )

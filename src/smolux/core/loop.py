@@ -19,18 +19,22 @@ from . import rng
 from .compile import cold_piece, entry, piece
 from .state import (
     BAD_FACTOR,
+    BAD_RATE,
     BUDGET,
+    CLOCKS,
     DONE,
     DOUBLE_AT,
     DOUBLINGS,
     DRAW,
     EVENTS,
+    EXCESS,
     EXTINCT,
     FIRE,
     FIRST,
     FLOOR,
     GROW,
     LARGEST,
+    LIMIT,
     NEXT,
     PARTICLES,
     PAUSE,
@@ -41,10 +45,13 @@ from .state import (
     REPAIRS,
     SINCE,
     TIME,
+    TOO_LARGE,
     TRIALS,
     VALUE,
     VOLUME,
     WINDOW,
+    WORST_I,
+    WORST_J,
     State,
     Tally,
 )
@@ -58,13 +65,14 @@ def choose_process(s, windows, factor, q):
     window = s.count[WINDOW]
     if windows.bounds.shape[1] == 1 and windows.edges[window + 1] == math.inf:
         return 0
-    x = rng.uniform(s.rng) * windows.total[window]
+    x = rng.uniform(s.rng) * (windows.total[window] + s.clock[EXCESS])
     r = 0
-    while r < windows.bounds.shape[1] - 1 and x >= windows.bounds[window, r]:
-        x -= windows.bounds[window, r]
+    bound = windows.bounds[window, 0] + s.clock[CLOCKS]
+    while r < windows.bounds.shape[1] - 1 and x >= bound:
+        x -= bound
         r += 1
+        bound = windows.bounds[window, r] + s.clock[CLOCKS + r]
     value = factor(r, s.clock[PENDING], q)
-    bound = windows.bounds[window, r]
     if not 0.0 <= value <= bound * _ROUNDING:
         s.clock[VALUE] = value
         s.count[PROCESS] = r
@@ -82,7 +90,8 @@ class Pieces(NamedTuple):
         The work arrays of replica `r`.
     draw : ``draw(s, w, p, factor)``
         Choose the next pair into ``count[FIRST]``, ``count[SECOND]`` (-1: nothing happens then)
-        and return the waiting time, the rate being `factor` times that of the kernel.
+        and return the waiting time, the rate being `factor` times that of the kernel; NaN if a
+        rate of a pair that is present is none, which `note_bad` has noted.
     pair : ``pair(s, w)``
         Sizes of the chosen pair.
     update : ``update(s, w, entries, p)``
@@ -111,20 +120,22 @@ def make_next_event(draw: Callable[..., Any]) -> Callable[..., Any]:
     @piece
     def next_event(s, w, windows, p):
         window = s.count[WINDOW]
-        total = windows.total[window]
+        total = windows.total[window] + s.clock[EXCESS]
         wait = math.inf
         if total > 0.0:
             wait = draw(s, w, p, total)
+        if math.isnan(wait):
+            return BAD_RATE
         pending = s.clock[TIME] + wait
         if pending >= windows.edges[window + 1] and windows.edges[window + 1] < math.inf:
             # the exponential law has no memory: go on afresh from the edge
             s.clock[TIME] = windows.edges[window + 1]
             s.count[WINDOW] = window + 1
-            return False
+            return 0
         s.clock[PENDING] = pending
         s.count[PROCESS] = -1
         s.count[PHASE] = FIRE
-        return True
+        return 0
 
     return next_event
 
@@ -149,6 +160,9 @@ def make_fire(
             if r >= 0:
                 i, j = pair(s, w)
                 entries = outcome(r, i, j, s.sizes, s.counts)
+                for e in range(entries):
+                    if s.sizes[e] >= LIMIT:
+                        return TOO_LARGE
                 if not update(s, w, entries, p):
                     return GROW
                 s.count[EVENTS] += 1
@@ -239,7 +253,10 @@ def make_loop(
                     return reason
                 if s.count[TRIALS] + s.count[EVENTS] >= stop:
                     return BUDGET
-                if not next_event(s, w, windows, p):
+                reason = next_event(s, w, windows, p)
+                if reason != 0:
+                    return reason
+                if s.count[PHASE] == DRAW:
                     continue
             while (
                 s.count[NEXT] < grid.times.shape[0] and grid.times[s.count[NEXT]] < s.clock[PENDING]
@@ -293,11 +310,18 @@ def make_loop(
 
 
 @cold_piece
-def repair(s, value):
+def repair(s, i, j, value):
     """Note a rate above its bound and raise the bound for the rest of the run."""
     s.count[REPAIRS] += 1
-    s.clock[VALUE] = value
+    s.count[WORST_I], s.count[WORST_J] = i, j
     s.clock[FLOOR] = max(s.clock[FLOOR], 1.1 * value)
+
+
+@cold_piece
+def note_bad(s, i, j, value):
+    """Note a rate that is negative, infinite or undefined: the run cannot go on."""
+    s.count[WORST_I], s.count[WORST_J] = i, j
+    s.clock[VALUE] = value
 
 
 @piece

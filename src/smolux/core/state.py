@@ -37,7 +37,11 @@ EXTINCT = 3  # when one particle was left; NaN before
 MAJORANT = 4  # bound of the rate over the sizes present
 FLOOR = 5  # least majorant, raised by repairs
 VALUE = 6  # the value that broke a bound
-CLOCKS = 7
+EXCESS = 7  # sum of what follows
+CLOCKS = 8  # from here on, for each process: what repairs have added to the bounds of its factor
+
+#: sizes stay below this, so that a sum of two cannot overflow
+LIMIT = 1 << 62
 
 DRAW, FIRE = 0, 1
 
@@ -49,6 +53,7 @@ BOUND = 3  # a bound of the kernel is asked for
 BAD_RATE = 4  # a negative or undefined rate
 BAD_FACTOR = 5  # a negative or undefined factor of a process
 PAUSED = 6  # an output time was recorded
+TOO_LARGE = 7  # a size would reach the limit
 
 
 class State(NamedTuple):
@@ -57,7 +62,7 @@ class State(NamedTuple):
     Attributes
     ----------
     rng : uint64 array of shape (R, 4)
-    clock : float64 array of shape (R, CLOCKS)
+    clock : float64 array of shape (R, CLOCKS + P)
     count : int64 array of shape (R, COUNTS)
     events : int64 array of shape (R, P)
         Collisions that ended in each process.
@@ -125,7 +130,7 @@ def new_state(rng: np.ndarray, processes: int, entries: int) -> State:
     replicas = len(rng)
     return State(
         rng,
-        np.zeros((replicas, CLOCKS)),
+        np.zeros((replicas, CLOCKS + processes)),
         np.zeros((replicas, COUNTS), np.int64),
         np.zeros((replicas, processes), np.int64),
         np.zeros((replicas, entries), np.int64),

@@ -11,10 +11,9 @@ import numpy as np
 from ..core import rng
 from ..core.compile import cold_piece, piece
 from ..core.levels import level_edges, level_of, renew_majorant
-from ..core.loop import Pieces, note_largest, repair, tally_one
+from ..core.loop import Pieces, note_bad, note_largest, repair, tally_one
 from ..core.prefetch import prefetch
 from ..core.state import (
-    BAD_RATE,
     FIRST,
     FLOOR,
     LARGEST,
@@ -25,6 +24,7 @@ from ..core.state import (
     SINCE,
     SMALLEST,
     STORED,
+    TIME,
     TRIALS,
     VALUE,
     VOLUME,
@@ -32,6 +32,7 @@ from ..core.state import (
     WORST_J,
     State,
 )
+from ..errors import InputError
 from .base import Int, Method, Rates, enlarged, spread
 
 #: candidates looked at before the loop may return without an event
@@ -109,8 +110,10 @@ def _make_draw(rate: Any) -> Any:
         n = s.count[PARTICLES]
         s.count[FIRST] = -1
         majorant = s.clock[MAJORANT]
-        if n < 2 or majorant <= 0.0:
+        if n < 2:
             return math.inf
+        if majorant <= 0.0:
+            return math.inf if s.clock[VALUE] == 0.0 else math.nan
         if w.ahead[0] < 0.0:
             for k in range(0, 2 * _AHEAD, 2):
                 _look_ahead(s, w, k)
@@ -125,8 +128,10 @@ def _make_draw(rate: Any) -> Any:
             i, j = _size(s, w, a), _size(s, w, b)
             value = value_of(w, i, j, p)
             if not 0.0 <= value <= majorant:
-                s.count[WORST_I], s.count[WORST_J] = i, j
-                repair(s, value)
+                if not 0.0 <= value < math.inf:
+                    note_bad(s, i, j, value)
+                    return math.nan
+                repair(s, i, j, value)
             if value >= majorant or rng.uniform(s.rng) * majorant < value:
                 s.count[FIRST], s.count[SECOND] = a, b
                 break
@@ -196,12 +201,7 @@ def _rescan(s, w):
 def _prepare(s, w, p):
     if s.count[SINCE] > s.count[PARTICLES] + 64:
         _rescan(s, w)
-    if s.clock[FLOOR] > s.clock[MAJORANT]:
-        if math.isinf(s.clock[FLOOR]):
-            return BAD_RATE
-        s.clock[MAJORANT] = s.clock[FLOOR]
-    elif not s.clock[VALUE] >= 0.0:
-        return BAD_RATE
+    s.clock[MAJORANT] = max(s.clock[MAJORANT], s.clock[FLOOR])
     return renew_majorant(s, w.edges, w.majorant, w.level)
 
 
@@ -296,7 +296,25 @@ class AcceptanceRejection(Method):
         highs = np.arange(max(low, block), min(block + 4, work.majorant.shape[1]))
         top = (work.edges[highs + 1] - 1).astype(float)
         bottom = np.full(top.shape, float(work.edges[low]))
-        work.majorant[low, highs] = rates.bounds(bottom, top, bottom, top)[1]
+        bound = rates.bounds(bottom, top, bottom, top)[1]
+        if not rates.rigorous:
+            # zeros alone prove nothing: candidates go on coming, at the rate of all sizes so far
+            wider = rates.bounds(np.ones(top.shape), top, np.ones(top.shape), top)[1]
+            bound = np.where(bound > 0.0, bound, wider)
+        bound[bound == np.inf] = np.nan
+        work.majorant[low, highs] = np.maximum(bound, 0.0)
+        smallest, largest = float(count[SMALLEST]), float(count[LARGEST])
+        if np.isnan(work.majorant[low, high]):
+            raise InputError(
+                f"the kernel has no finite bound for the sizes {smallest:.0f} to {largest:.0f}, "
+                f"which were reached at t = {state.clock[replica, TIME]:.6g}; limit what grows, as "
+                "in exp(min(x, 700)), or end earlier"
+            )
+        if work.majorant[low, high] == 0.0:  # no candidate would ever find a rate below zero
+            value = float(rates.arrays(smallest, largest))
+            if not 0.0 <= value < np.inf:
+                state.clock[replica, VALUE] = value
+                count[WORST_I], count[WORST_J] = smallest, largest
 
     def population(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
         """See `Method.population`."""

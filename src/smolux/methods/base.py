@@ -29,12 +29,15 @@ class Rates:
         See `smolux.kernels.base.Kernel.bounds`.
     cheap : bool
         Whether reading a table costs as much as computing the rate.
+    rigorous : bool
+        Whether `bounds` is proved.
     """
 
     parameters: tuple[float, ...]
     arrays: Callable[[Any, Any], Float]
     bounds: Callable[..., tuple[Float, Float]]
     cheap: bool
+    rigorous: bool
 
     def table(self, largest: int) -> Float:
         """Rates of the sizes ``1 .. largest`` with each other."""

@@ -10,9 +10,8 @@ import numpy as np
 
 from ..core import rng
 from ..core.compile import cold_piece, piece
-from ..core.loop import Pieces, note_largest, tally_one
+from ..core.loop import Pieces, note_bad, note_largest, tally_one
 from ..core.state import (
-    BAD_RATE,
     FIRST,
     LARGEST,
     PARTICLES,
@@ -22,8 +21,6 @@ from ..core.state import (
     TRIALS,
     VALUE,
     VOLUME,
-    WORST_I,
-    WORST_J,
     State,
 )
 from ..core.sums import BLOCK, find, find_large, shift, weigh
@@ -51,8 +48,9 @@ class Work(NamedTuple):
     large : int64 array of shape (R, capacity)
         Sizes above B; the first ``count[STORED]`` are in use.
     large_rate : float64 array of shape (R, capacity)
-    table : float64 array of shape (B + 3, B)
-        Rates of bucket sizes with each other; the last three rows are scratch for larger sizes.
+    table : float64 array of shape (B + 3, B), or (2 B + 3, B)
+        Rates of bucket sizes with each other; three rows of scratch for larger sizes. If the
+        kernel gives no rate somewhere, zeros stand there, and its own values in the last B rows.
     """
 
     number: np.ndarray
@@ -136,16 +134,18 @@ def _visit(s, w, t, grid):
     return largest
 
 
-def _make_rates(rate: Any) -> tuple[Any, Any, Any]:
+def _make_rates(rate: Any) -> tuple[Any, Any, Any, Any]:
     @piece
-    def pair_rate(s, w, i, j, p):
+    def pair_rate(s, w, i, j, met, p):
+        """Rate of two sizes; 0 where the kernel gives none, which is noted if they have `met`."""
         if i <= w.table.shape[1] and j <= w.table.shape[1]:
             return w.table[i - 1, j - 1]
         value = rate(float(i), float(j), *p)
-        if not 0.0 <= value < math.inf:
-            s.clock[VALUE] = value
-            s.count[WORST_I], s.count[WORST_J] = i, j
-        return value
+        if 0.0 <= value < math.inf:
+            return value
+        if met:
+            note_bad(s, i, j, value)
+        return 0.0
 
     @cold_piece
     def row_of(s, w, scratch, size, top, p):
@@ -155,19 +155,31 @@ def _make_rates(rate: Any) -> tuple[Any, Any, Any]:
             return size - 1
         row = buckets + scratch
         for k in range(top):
-            w.table[row, k] = pair_rate(s, w, np.int64(k + 1), size, p)
+            w.table[row, k] = pair_rate(s, w, np.int64(k + 1), size, w.number[k] > 0.0, p)
         return np.int64(row)
 
     @cold_piece
-    def own_rate(s, w, size, p):
-        """Rate of a particle of `size` that is present with all others."""
+    def own_rate(s, w, size, d, p):
+        """Rate of a particle with all others: a large one in place `d`, or one of a bucket (-1)."""
         top = _top(s, w)
         total = weigh(w.number, w.table, row_of(s, w, 0, size, top, p), w.block, top)
-        for d in range(s.count[STORED]):
-            total += pair_rate(s, w, size, w.large[d], p)
-        return total - pair_rate(s, w, size, size, p)
+        met = d >= 0 or w.number[size - 1] > 0.0
+        for k in range(s.count[STORED]):
+            if k != d:
+                total += pair_rate(s, w, size, w.large[k], met, p)
+        return total if d >= 0 else total - w.table[size - 1, size - 1]
 
-    return pair_rate, row_of, own_rate
+    @cold_piece
+    def look(s, w, size):
+        """Note a pair of buckets that are present for which the kernel gives no rate."""
+        row = w.table.shape[1] + 2 + size
+        if w.number[size - 1] > 0.0:
+            for k in range(_top(s, w)):
+                others = w.number[k] - (1.0 if k == size - 1 else 0.0)
+                if others > 0.0 and not 0.0 <= w.table[row, k] < math.inf:
+                    note_bad(s, size, np.int64(k + 1), w.table[row, k])
+
+    return pair_rate, row_of, own_rate, look
 
 
 def _make_draw(pair_rate: Any, row_of: Any) -> Any:
@@ -183,13 +195,13 @@ def _make_draw(pair_rate: Any, row_of: Any) -> Any:
         large = 0.0
         for d in range(stored):
             if buckets + d != a:
-                large += pair_rate(s, w, size, w.large[d], p)
+                large += pair_rate(s, w, size, w.large[d], True, p)
         x = rng.uniform(s.rng) * (small + large)
         slot = find(w.number, w.table, row, w.block, top, x) if x < small else -1
         if slot < 0:
             x -= small
             for d in range(stored):
-                weight = pair_rate(s, w, size, w.large[d], p)
+                weight = pair_rate(s, w, size, w.large[d], False, p)
                 if buckets + d != a and weight > 0.0:
                     slot = buckets + d
                     if x < weight:
@@ -203,6 +215,8 @@ def _make_draw(pair_rate: Any, row_of: Any) -> Any:
     def draw(s, w, p, factor):
         s.count[FIRST] = -1
         s.count[TRIALS] += 1
+        if not 0.0 <= s.clock[VALUE] < math.inf:
+            return math.nan
         small = weigh(w.number, w.rate, 0, w.block, _top(s, w))
         large = 0.0
         for d in range(s.count[STORED]):
@@ -221,7 +235,7 @@ def _make_draw(pair_rate: Any, row_of: Any) -> Any:
     return draw
 
 
-def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
+def _make_update(pair_rate: Any, row_of: Any, own_rate: Any, look: Any) -> Any:
     @cold_piece
     def account(s, w, i, j, gone, size, count, p):
         """Account in all rates for `gone` of `i` and `j` each and `count` new ones of `size`."""
@@ -238,8 +252,8 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
         )
         for d in range(s.count[STORED]):
             large = w.large[d]
-            w.large_rate[d] += count * pair_rate(s, w, size, large, p) - gone * (
-                pair_rate(s, w, i, large, p) + pair_rate(s, w, j, large, p)
+            w.large_rate[d] += count * pair_rate(s, w, size, large, True, p) - gone * (
+                pair_rate(s, w, i, large, False, p) + pair_rate(s, w, j, large, False, p)
             )
 
     @cold_piece
@@ -249,12 +263,14 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
         s.count[PARTICLES] += count
         if size <= buckets:
             w.number[size - 1] += count
+            if w.table.shape[0] > buckets + 3:
+                look(s, w, size)
             return
         first = s.count[STORED]
         for d in range(first, first + count):
             w.large[d] = size
         s.count[STORED] += count
-        own = own_rate(s, w, size, p)
+        own = own_rate(s, w, size, first, p)
         for d in range(first, first + count):
             w.large_rate[d] = own
 
@@ -266,7 +282,7 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
         for k in range(old, _top(s, w)):
             w.rate[0, k] = 0.0
         for k in range(old, _top(s, w)):
-            w.rate[0, k] = own_rate(s, w, np.int64(k + 1), p)
+            w.rate[0, k] = own_rate(s, w, np.int64(k + 1), -1, p)
 
     @cold_piece
     def update(s, w, entries, p):
@@ -293,7 +309,7 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any) -> Any:
     return update
 
 
-def _make_prepare(own_rate: Any) -> Any:
+def _make_prepare(own_rate: Any, look: Any) -> Any:
     @cold_piece
     def renew(s, w, p):
         """Compute every rate afresh, and the largest size."""
@@ -305,16 +321,18 @@ def _make_prepare(own_rate: Any) -> Any:
             largest = max(largest, w.large[d])
         s.count[LARGEST] = largest
         for k in range(_top(s, w)):
-            w.rate[0, k] = own_rate(s, w, np.int64(k + 1), p)
+            w.rate[0, k] = own_rate(s, w, np.int64(k + 1), -1, p)
+            if w.table.shape[0] > w.table.shape[1] + 3:
+                look(s, w, np.int64(k + 1))
         for d in range(s.count[STORED]):
-            w.large_rate[d] = own_rate(s, w, w.large[d], p)
+            w.large_rate[d] = own_rate(s, w, w.large[d], d, p)
         s.count[SINCE] = 1
 
     @piece
     def prepare(s, w, p):
         if s.count[SINCE] == 0 or s.count[SINCE] > _REFRESH:
             renew(s, w, p)
-        return np.int64(0) if 0.0 <= s.clock[VALUE] < math.inf else np.int64(BAD_RATE)
+        return 0
 
     return prepare
 
@@ -348,19 +366,19 @@ class Inverse(Method):
     @staticmethod
     def bind(rate: Any) -> Pieces:
         """See `Method.bind`."""
-        pair_rate, row_of, own_rate = _make_rates(rate)
+        pair_rate, row_of, own_rate, look = _make_rates(rate)
         return Pieces(
             _view,
             _make_draw(pair_rate, row_of),
             _pair,
-            _make_update(pair_rate, row_of, own_rate),
-            _make_prepare(own_rate),
+            _make_update(pair_rate, row_of, own_rate, look),
+            _make_prepare(own_rate, look),
             _double,
             _visit,
         )
 
     def __post_init__(self) -> None:
-        if self.buckets < 1:
+        if not (isinstance(self.buckets, (int, np.integer)) and self.buckets >= 1):
             raise InputError(f"buckets = {self.buckets!r}: must be a whole number of at least 1")
 
     def new_work(
@@ -379,13 +397,16 @@ class Inverse(Method):
             spread(sizes[above], counts[above], large[r, : stored[r]])
             count = state.count[r]
             count[STORED], count[PARTICLES], count[LARGEST] = stored[r], counts.sum(), sizes[-1]
+        given = rates.table(buckets)
+        valid = (given >= 0.0) & (given < np.inf)
+        table = np.vstack((np.where(valid, given, 0.0), np.zeros((3, buckets))))
         return Work(
             number,
             np.zeros((replicas, 1, buckets)),
             np.zeros((replicas, -(-buckets // BLOCK))),
             large,
             np.zeros(large.shape),
-            np.vstack((rates.table(buckets), np.zeros((3, buckets)))),
+            table if valid.all() else np.vstack((table, given)),
         )
 
     def grow(self, work: Work, state: State) -> Work:
