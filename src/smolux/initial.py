@@ -7,9 +7,10 @@ particle of its share and the expected counts are exact.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,9 @@ Int = NDArray[np.int64]
 _TAIL = 2.0**-53
 _BELOW_ONE = 1.0 - _TAIL
 
+
+#: sizes are at most this at the start, so that two can still be added
+_LARGEST = 1 << 61
 
 #: distributions up to this size are sampled size by size, others particle by particle in batches
 _TABULATED = 1 << 20
@@ -92,12 +96,32 @@ class Initial:
         return size, np.bincount(inverse, np.concatenate([c for _, c in drawn])).astype(np.int64)
 
 
+def _number(value: Any) -> Any:
+    """Return a number as a float, and anything else as it is, to be refused by name."""
+    real = isinstance(value, (int, float, np.number)) and not isinstance(value, (bool, np.bool_))
+    return float(value) if real else value
+
+
+def _beyond(least: float, value: Any) -> bool:
+    """Whether a value is a finite number above `least`."""
+    number = _number(value)
+    return isinstance(number, float) and math.isfinite(number) and number > least
+
+
 def _positive(problems: list[str], **values: float) -> None:
     problems += [
         f"{key} = {value!r}: must be a positive finite number"
         for key, value in values.items()
-        if not (np.isfinite(value) and value > 0)
+        if not _beyond(0.0, value)
     ]
+
+
+def _raise(problems: list[str], law: Initial, most: float) -> None:
+    """Raise for every problem, or if the sizes reach beyond what can be counted."""
+    if most > _LARGEST:
+        problems.append(f"{law!r}: reaches the size {most:.3g}; sizes are at most 2**61 = 2.3e18")
+    if problems:
+        raise InputError(problems)
 
 
 @dataclass(frozen=True)
@@ -113,14 +137,14 @@ class Sizes(Initial):
         if not self.sizes:
             problems.append("initial sizes: at least one size is needed, for example {1: 1.0}")
         problems += [
-            f"initial size {s!r}: sizes are whole numbers from 1 to 2**62"
+            f"initial size {s!r}: sizes are whole numbers from 1 to 2**61"
             for s in self.sizes
-            if s != int(s) or not 1 <= s <= 2**62
+            if not isinstance(s, int) or isinstance(s, bool) or not 1 <= s <= _LARGEST
         ]
         problems += [
             f"initial density {d!r} of size {s}: must be a finite number, zero or more"
             for s, d in zip(self.sizes, self.densities_, strict=True)
-            if not (np.isfinite(d) and d >= 0)
+            if not (d == 0.0 or _beyond(0.0, d))
         ]
         if self.sizes and not problems and sum(self.densities_) <= 0:
             problems.append("initial sizes: every density is zero")
@@ -172,10 +196,9 @@ class Exponential(Initial):
     def __post_init__(self) -> None:
         problems: list[str] = []
         _positive(problems, density=self.density)
-        if not (np.isfinite(self.mean) and self.mean >= 1):
+        if not (_beyond(0.0, self.mean) and self.mean >= 1):
             problems.append(f"mean = {self.mean!r}: the mean size must be a number of at least 1")
-        if problems:
-            raise InputError(problems)
+        _raise(problems, self, 0.0 if problems else 37.0 * self.mean)
 
     @property
     def total(self) -> float:
@@ -218,13 +241,15 @@ class Lognormal(Initial):
     def __post_init__(self) -> None:
         problems: list[str] = []
         _positive(problems, median=self.median, density=self.density)
-        if not (np.isfinite(self.sigma) and self.sigma > 1):
+        if not _beyond(1.0, self.sigma):
             problems.append(
                 f"sigma = {self.sigma!r}: the geometric standard deviation must exceed 1 "
                 "(1.3 is narrow, 2 is wide)"
             )
-        if problems:
-            raise InputError(problems)
+        most = 0.0
+        if not problems:  # the tail is cut off 8.2 standard deviations from the median
+            most = math.exp(min(math.log(self.median) + 8.3 * math.log(self.sigma), 700.0))
+        _raise(problems, self, most)
 
     @property
     def total(self) -> float:
@@ -264,10 +289,20 @@ def from_sizes(densities: Mapping[int, float]) -> Sizes:
     densities : mapping of int to float
         Size to particles per unit volume.
     """
-    items = sorted(densities.items())
-    return Sizes(
-        tuple(int(s) if s == int(s) else s for s, _ in items), tuple(float(d) for _, d in items)
-    )
+    if not isinstance(densities, Mapping):
+        raise InputError(
+            f"initial sizes = {densities!r}: must map sizes to densities, as {{1: 0.5, 2: 0.5}}"
+        )
+    pairs = [(_whole(size), _number(density)) for size, density in densities.items()]
+    if all(isinstance(size, int) for size, _ in pairs):
+        pairs.sort()
+    return Sizes(tuple(size for size, _ in pairs), tuple(density for _, density in pairs))
+
+
+def _whole(size: Any) -> Any:
+    """Return a whole number as an int, and anything else as it is."""
+    number = _number(size)
+    return int(size) if isinstance(number, float) and number.is_integer() else size
 
 
 def exponential(mean: float, density: float = 1.0) -> Exponential:
@@ -280,7 +315,7 @@ def exponential(mean: float, density: float = 1.0) -> Exponential:
     density : float
         Particles per unit volume.
     """
-    return Exponential(float(mean), float(density))
+    return Exponential(_number(mean), _number(density))
 
 
 def lognormal(median: float, sigma: float, density: float = 1.0) -> Lognormal:
@@ -295,7 +330,7 @@ def lognormal(median: float, sigma: float, density: float = 1.0) -> Lognormal:
     density : float
         Particles per unit volume.
     """
-    return Lognormal(float(median), float(sigma), float(density))
+    return Lognormal(_number(median), _number(sigma), _number(density))
 
 
 #: every initial condition; case files know it by its ``name``, and one size as "monodisperse"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from .errors import InputError
 from .initial import Initial, monodisperse
@@ -43,9 +44,7 @@ class Model:
                 f"kernel = {self.kernel!r}: must be a kernel such as smolux.kernels.Ballistic(); "
                 "wrap a function K(i, j) with smolux.kernels.from_function(K)"
             )
-        processes = (
-            (self.processes,) if isinstance(self.processes, PairProcess) else tuple(self.processes)
-        )
+        processes = _processes(self.processes)
         object.__setattr__(self, "processes", processes)
         if not processes:
             problems.append(
@@ -71,3 +70,9 @@ class Model:
             problems = self.kernel.problems(self.initial.largest)
         if problems:
             raise InputError(problems)
+
+
+def _processes(given: Any) -> tuple[Any, ...]:
+    """Return what was given as processes, one or several, right or wrong, as a tuple."""
+    single = isinstance(given, (PairProcess, str)) or not isinstance(given, Iterable)
+    return (given,) if single else tuple(given)
