@@ -21,6 +21,11 @@ from .plan import Plan
 from .replicas import Group
 from .weighting import WEIGHTINGS
 
+#: what reading a file that is no checkpoint, or half of one, may raise
+_UNREADABLE = (
+    OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, zipfile.BadZipFile,
+)  # fmt: skip
+
 #: raised whenever the content of a checkpoint changes
 VERSION = 1
 
@@ -112,13 +117,16 @@ def load(path: str | Path, model: Model | None = None) -> tuple[Plan, list[Group
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         meta = json.loads(arrays.pop("meta").tobytes())
+        version = meta["version"]
     except FileNotFoundError:
         raise InputError(f"checkpoint = {str(path)!r}: there is no such file") from None
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise InputError(f"checkpoint = {str(path)!r}: cannot be read ({error})") from error
-    if meta["version"] != VERSION:
+    except _UNREADABLE as error:
         raise InputError(
-            f"checkpoint = {str(path)!r}: has version {meta['version']}, this smolux reads "
+            f"checkpoint = {str(path)!r}: is none, or damaged ({type(error).__name__}: {error})"
+        ) from error
+    if version != VERSION:
+        raise InputError(
+            f"checkpoint = {str(path)!r}: has version {version}, this smolux reads "
             f"{VERSION}; go on with the smolux that wrote it"
         )
     if model is not None and model_to_dict(model) != meta["plan"]["model"]:

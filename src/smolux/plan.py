@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -95,17 +96,13 @@ def make_plan(
         "particles": _whole("particles", particles, 2, problems),
         "replicas": _whole("replicas", replicas, 1, problems),
         "sizes": _whole("sizes", sizes, 1, problems),
-        "bins_per_octave": _whole("bins_per_octave", bins_per_octave, 1, problems),
+        "bins_per_octave": _whole("bins_per_octave", bins_per_octave, 1, problems, 1024),
     }
     entropy = (
         np.random.SeedSequence().entropy if seed is None else _whole("seed", seed, 0, problems)
     )
     output = check_times(times, problems)
-    powers = np.atleast_1d(np.asarray(orders, float))
-    if powers.ndim != 1 or not powers.size or not np.isfinite(powers).all():
-        problems.append(
-            f"orders = {orders!r}: must be a list of finite numbers, such as (0, 1, 2, 3)"
-        )
+    powers = _orders(orders, problems)
     if problems:
         raise InputError(problems)
     plan = Plan(
@@ -113,7 +110,7 @@ def make_plan(
         times=output,
         population=population,
         entropy=int(entropy),  # type: ignore[arg-type]
-        orders=tuple(float(p) for p in powers),
+        orders=powers,
         distribution=bool(distribution),
         **found,
         **numbers,  # type: ignore[arg-type]
@@ -132,15 +129,29 @@ def _chosen(what: str, value: Any, registry: Sequence[Any], kind: type, problems
     return None
 
 
-def _whole(what: str, value: Any, least: int, problems: list[str]) -> int:
+def _whole(what: str, value: Any, least: int, problems: list[str], most: float = math.inf) -> int:
     try:
         whole = int(value)
-        if whole == value and whole >= least and not isinstance(value, bool):
+        if whole == value and least <= whole <= most and not isinstance(value, bool):
             return whole
     except (TypeError, ValueError, OverflowError):
         pass
-    problems.append(f"{what} = {value!r}: must be a whole number of at least {least}")
+    limits = f"of at least {least}" if most == math.inf else f"from {least} to {most}"
+    problems.append(f"{what} = {value!r}: must be a whole number {limits}")
     return least
+
+
+def _orders(orders: Any, problems: list[str]) -> tuple[float, ...]:
+    try:
+        powers = np.atleast_1d(np.asarray(orders, float))
+    except (TypeError, ValueError):
+        powers = np.empty(0)
+    flat = tuple(float(p) for p in powers.ravel())
+    if powers.ndim != 1 or not flat or not np.isfinite(powers).all() or len(set(flat)) < len(flat):
+        problems.append(
+            f"orders = {orders!r}: must be a list of different finite numbers, such as (0, 1, 2, 3)"
+        )
+    return flat
 
 
 def check_times(times: ArrayLike, problems: list[str]) -> tuple[float, ...]:

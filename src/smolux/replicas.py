@@ -130,9 +130,12 @@ class Group:
         )
 
     def advance(self, stop: Callable[[], bool]) -> None:
-        """Go on until done or until `stop` says so, asked about ten times a second."""
+        """Go on until done or until `stop` says so, asked about ten times a second.
+
+        Every call gets something done, so that a run interrupted again and again comes to its end.
+        """
         budget = 10_000
-        while not self.done and not stop():
+        while not self.done:
             before = self._effort()
             start = time.perf_counter()
             self._call(self.codes, budget)
@@ -142,6 +145,8 @@ class Group:
             spent = self._effort() - before
             if spent > 0.5 * budget:
                 budget = int(min(max(spent * _SLICE / max(elapsed, 1e-6), 1000), 1e10, 20 * budget))
+            if stop():
+                return
 
     def _effort(self) -> int:
         return int(self.state.count[:, (TRIALS, EVENTS)].sum())

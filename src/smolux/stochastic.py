@@ -5,17 +5,17 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import FIRST_EXCEPTION, Executor, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checkpoint as checkpoints
-from .errors import Interrupted
+from .errors import InputError, Interrupted
 from .methods.base import Method
 from .model import Model
 from .observe import to_records
@@ -144,10 +144,16 @@ def simulate(
     >>> float(ds["moment"].sel(order=1).mean())
     1.0
     """
-    plan = make_plan(
-        model, times, method, weighting, population, particles, replicas, seed, orders, sizes,
-        bins_per_octave, distribution,
-    )  # fmt: skip
+    problems = _control_problems(executor, progress, checkpoint, checkpoint_every, time_limit)
+    try:
+        plan = make_plan(
+            model, times, method, weighting, population, particles, replicas, seed, orders, sizes,
+            bins_per_octave, distribution,
+        )  # fmt: skip
+    except InputError as error:
+        raise InputError([*error.problems, *problems]) from None
+    if problems:
+        raise InputError(problems)
     if executor is not None and not isinstance(executor, ThreadPoolExecutor):
         return _elsewhere(plan, executor)
     groups = [Group.start(plan, *part) for part in plan.groups(_workers())]
@@ -184,9 +190,51 @@ def resume(
     InputError, Interrupted
         As `simulate`, and if the file cannot be read.
     """
-    plan, groups = checkpoints.load(Path(checkpoint), model)
+    problems = _control_problems(executor, progress, checkpoint, checkpoint_every, time_limit)
+    if problems:
+        raise InputError(problems)
+    plan, groups = checkpoints.load(Path(checkpoint).expanduser(), model)
     run = _Run(plan, groups, executor, progress, checkpoint, checkpoint_every, time_limit)
     return run.finish()
+
+
+def _control_problems(
+    executor: Any, progress: Any, checkpoint: Any, checkpoint_every: Any, time_limit: Any
+) -> list[str]:
+    """Return what is wrong with the arguments that decide how a run is driven, not its outcome."""
+    problems = []
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        problems.append(
+            f"executor = {executor!r}: must be a concurrent.futures.Executor, or None for threads"
+        )
+    elif executor is not None and not isinstance(executor, ThreadPoolExecutor):
+        problems += [
+            f"{name} = {value!r}: is only for runs on threads of this process; "
+            "leave it out, or leave out the executor"
+            for name, value in (("checkpoint", checkpoint), ("time_limit", time_limit))
+            if value is not None
+        ]
+    if progress is not None and not callable(progress):
+        problems.append(f"progress = {progress!r}: must be a function that takes a Progress")
+    if checkpoint is not None:
+        problems += _path_problems(checkpoint)
+    for name, value in (("checkpoint_every", checkpoint_every), ("time_limit", time_limit)):
+        number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+        if not (number and value > 0) and (name, value) != ("time_limit", None):
+            problems.append(f"{name} = {value!r}: must be a positive number of seconds")
+    return problems
+
+
+def _path_problems(checkpoint: Any) -> list[str]:
+    where = f"checkpoint = {checkpoint!r}"
+    if not isinstance(checkpoint, (str, os.PathLike)):
+        return [f"{where}: must be the path of a file"]
+    path = Path(checkpoint).expanduser()
+    if path.is_dir():
+        return [f"{where}: is a folder; name a file in it"]
+    if not path.absolute().parent.is_dir():
+        return [f"{where}: there is no folder {str(path.parent)!r}; create it first"]
+    return []
 
 
 def _workers() -> int:
@@ -207,11 +255,12 @@ class _Run:
         time_limit: float | None,
     ) -> None:
         self.plan, self.groups, self.executor, self.progress = plan, groups, executor, progress
-        self.checkpoint = None if checkpoint is None else Path(checkpoint)
+        self.checkpoint = None if checkpoint is None else Path(checkpoint).expanduser()
         self.every = checkpoint_every
         self.limit = np.inf if time_limit is None else time_limit
         self.started = time.perf_counter()
         self.compile_seconds = 0.0
+        self.unsaved = ""
 
     def finish(self) -> xr.Dataset:
         """Run to the end, or raise `Interrupted` with what there is."""
@@ -225,7 +274,11 @@ class _Run:
         if reason:
             self._save()
             where = f"; go on from {self.checkpoint}" if self.checkpoint else ""
-            raise Interrupted(f"{reason}{where}", self._dataset(), self.checkpoint)
+            raise Interrupted(
+                f"{reason}{where}{self.unsaved and '; ' + self.unsaved}",
+                self._dataset(),
+                self.checkpoint,
+            )
         ds = self._dataset()
         if self.checkpoint is not None:
             self.checkpoint.unlink(missing_ok=True)
@@ -235,31 +288,30 @@ class _Run:
         """Advance all groups; return why it stopped early, or nothing."""
         pool = self.executor or ThreadPoolExecutor(_workers())
         try:
-            while not all(g.done for g in self.groups):
+            while True:
+                self._stretch(pool)
+                if all(g.done for g in self.groups):
+                    return ""
                 if time.perf_counter() - self.started > self.limit:
                     return f"stopped at the time limit of {self.limit:g} s"
-                self._stretch(pool)
-                if self.checkpoint is not None and not all(g.done for g in self.groups):
-                    self._save()
+                self._save()
         finally:
             if self.executor is None:
                 pool.shutdown()
-        return ""
 
     def _stretch(self, pool: Executor) -> None:
         """Advance all groups until they are done, or until a checkpoint or the limit is due."""
         halt = Event()
-        begun = events = 0.0
         begun, events = time.perf_counter(), float(sum(g.events for g in self.groups))
         due = min(begun + self.every if self.checkpoint else np.inf, self.started + self.limit)
         waiting = [pool.submit(g.advance, halt.is_set) for g in self.groups if not g.done]
         try:
             while waiting and time.perf_counter() < due:
-                time.sleep(min(_TICK, 0.01 + 0.1 * (time.perf_counter() - begun)))
-                failed = [f for f in waiting if f.done() and f.exception() is not None]
-                for future in failed:
+                tick = min(_TICK, 0.01 + 0.1 * (time.perf_counter() - begun))
+                ended, left = wait(waiting, tick, FIRST_EXCEPTION)
+                for future in ended:
                     future.result()
-                waiting = [f for f in waiting if not f.done()]
+                waiting = list(left)
                 self._report(begun, events)
         finally:
             halt.set()
@@ -281,12 +333,19 @@ class _Run:
         self.progress(Progress(events, fraction, rate, left, self.compile_seconds))
 
     def _save(self) -> None:
-        if self.checkpoint is not None:
+        if self.checkpoint is None:
+            return
+        try:
             checkpoints.save(self.checkpoint, self.plan, self.groups)
+            self.unsaved = ""
+        except (OSError, InputError) as error:  # a full disk must not cost what is computed
+            self.unsaved = f"no checkpoint was written: {error}"
 
     def _dataset(self) -> xr.Dataset:
         records = to_records(self.plan, self.groups)
         records.attributes["wall_seconds"] = time.perf_counter() - self.started
+        if self.unsaved:
+            records.warnings.append(self.unsaved)
         return to_dataset(self.plan.model, records)
 
 
@@ -302,6 +361,12 @@ def _elsewhere(plan: Plan, executor: Executor) -> xr.Dataset:
     started = time.perf_counter()
     workers = getattr(executor, "_max_workers", None) or _workers()
     futures = [executor.submit(_run_group, plan, *part) for part in plan.groups(workers)]
-    records = to_records(plan, [f.result() for f in futures])
+    try:
+        groups = [f.result() for f in futures]
+    except BaseException:
+        for future in futures:
+            future.cancel()
+        raise
+    records = to_records(plan, groups)
     records.attributes["wall_seconds"] = time.perf_counter() - started
     return to_dataset(plan.model, records)
