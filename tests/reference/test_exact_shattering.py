@@ -11,7 +11,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.special import gamma, hyp2f1
 
 from smolux import exact
-from smolux.exact.generating import coefficients, generating_function, radius
+from smolux.exact.generating import generating_function
 
 LAMBDAS = [1e-3, 0.1, 1.0, 10.0]
 
@@ -125,17 +125,28 @@ def test_tail_follows_the_pole() -> None:
     # n_k R**k tends to a constant: the residue at the pole at z = R
     solution = exact.ConstantShattering(lam=0.1)
     n = solution.densities(10.0, [400, 500, 600])
-    pole = radius(0.1, 10.0)
+    function = generating_function(0.1, 10.0)
+    pole = function.radius
     np.testing.assert_allclose(n[1:] / n[:-1] * pole**100, 1, rtol=1e-6)
     just_below, just_above = pole * (1 - 1e-6), pole * (1 + 1e-6)
-    g = generating_function(np.array([just_below, just_above], complex), 0.1, 10.0).real
+    g = function(np.array([just_below, just_above], complex)).real
     assert g[0] > 1e4
     assert g[1] < -1e4
+
+
+@pytest.mark.parametrize("lam", np.geomspace(1e-8, 1e3, 12).tolist())
+def test_the_transform_finds_the_monomers_over_the_whole_range(lam: float) -> None:
+    # n_1 is known in closed form and not used by the generating function
+    for t in np.geomspace(1e-13 / (1 + lam), 1e4, 9).tolist():
+        closed = float(exact.ConstantShattering(lam=lam).densities(t, 1))
+        found = generating_function(lam, t).coefficients(64)
+        assert found[1] == pytest.approx(closed, rel=2e-14)
+        assert (found[2:] > -1e-300).all()
 
 
 def test_bands_join_smoothly() -> None:
     # sizes up to 64, 128, ... come from different contours
     n = exact.ConstantShattering(lam=0.02).densities(60.0, np.arange(1, 1025))
     for high in (128, 256, 512, 1024, 2048):
-        wider = coefficients(0.02, 60.0, high)[high // 4 : high // 2 + 1]
+        wider = generating_function(0.02, 60.0).coefficients(high)[high // 4 : high // 2 + 1]
         np.testing.assert_allclose(n[high // 4 - 1 : high // 2], wider, rtol=1e-11)

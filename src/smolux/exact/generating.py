@@ -16,7 +16,8 @@ from point to point, and for small ``x`` by the two series of Frobenius.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,101 +115,114 @@ def _advance(z: Complex, lam: float, t: float) -> tuple[Complex, Complex, float,
     return w, p, x, left
 
 
-def _finish(
-    z: Complex, lam: float, w: Complex, p: Complex, x: float, left: float
-) -> tuple[Complex, Complex]:
-    """Carry ``w`` and ``theta w`` over what `_advance` left."""
-    if left == 0:
-        return w, p
-    nu = 2 / (1 + 2 * lam)
-    return _frobenius(z * (nu / 2), w, p, x, left, (1 + lam) * nu)
+@dataclass(frozen=True)
+class GeneratingFunction:
+    """The generating function at one time; see `generating_function`.
+
+    Both ``w`` and ``theta w`` are entire in `z`: their Taylor coefficients about a point near the
+    first pole of G follow from few values on a circle, and serve everywhere inside it.
+
+    Attributes
+    ----------
+    lam : float
+        Shattering rate.
+    centre, span : float
+        Centre and radius of the circle.
+    w, p : ndarray
+        Taylor coefficients in ``(z - centre) / span``.
+    x, left : float
+        Where the Taylor series in x stopped, and ``lam`` times the time that is left.
+    """
+
+    lam: float
+    centre: float
+    span: float
+    w: Float
+    p: Float
+    x: float
+    left: float
+
+    def solve(self, z: Complex) -> tuple[Complex, Complex]:
+        """Return ``w`` and ``theta w``, up to a common factor above 0.
+
+        Parameters
+        ----------
+        z : ndarray of complex
+            Inside the circle; if real, at least the radius of convergence of the steady state.
+        """
+        u = (z - self.centre) / self.span
+        w = np.asarray(np.polynomial.polynomial.polyval(u, self.w), complex)
+        p = np.asarray(np.polynomial.polynomial.polyval(u, self.p), complex)
+        if self.left == 0:
+            return w, p
+        nu = 2 / (1 + 2 * self.lam)
+        drift = (1 + self.lam) * nu
+        return _frobenius(z * (nu / 2), w, p, self.x, self.left, drift)
+
+    def __call__(self, z: Complex) -> Complex:
+        """Evaluate ``G``; see `solve`."""
+        w, p = self.solve(z)
+        return 2 * self.lam * p / w
+
+    @cached_property
+    def radius(self) -> float:
+        """Radius of convergence in `z`, to one part in 1e9: the pole nearest to the origin.
+
+        It lies on the positive axis and falls with time to ``(1 + lam)**2 / (1 + 2 lam)``.
+        """
+        steady = (1 + self.lam) ** 2 / (1 + 2 * self.lam)
+        # The zeros of w lie at excesses of about 1 : 4 : 9 : ..., and w is positive before.
+        excess = np.geomspace(1e-9, 1.5 * self.centre / steady - 1, 400)
+        while True:
+            value = self.solve((steady * (1 + excess)).astype(complex))[0].real
+            beyond = np.flatnonzero(~(value > 0))
+            first = int(beyond[0]) if beyond.size else excess.size - 1
+            if first == 0:
+                return steady
+            low, high = float(excess[first - 1]), float(excess[first])
+            if high - low <= 1e-9 * (1 + low):
+                return steady * (1 + low)
+            excess = np.linspace(low, high, 100)
+
+    def coefficients(self, largest: int) -> Float:
+        """Densities ``n_0 = 0, n_1, ..., n_largest``; the upper half accurate relative to each.
+
+        Cauchy's integral over a circle just inside the pole, by the trapezoidal rule (a Fourier
+        transform). Its points avoid the real axis, where the exponents may differ by a whole
+        number.
+
+        Parameters
+        ----------
+        largest : int
+        """
+        circle = self.radius * math.exp(-_DEPTH / largest)
+        points = _OVER * largest
+        g = np.empty(points // 2, complex)
+        for start in range(0, g.size, _CHUNK):
+            index = np.arange(start, min(start + _CHUNK, g.size))
+            g[index] = self(circle * np.exp(2j * np.pi / points * (index + 0.5)))
+        k = np.arange(largest + 1)
+        # G at conjugate points is conjugate: the real part of the sum over the upper half
+        sums = np.fft.fft(g, points)[: largest + 1]
+        sums = 2 * (sums * np.exp(-1j * np.pi * k / points)).real / points
+        return sums * np.exp(-k * math.log(circle))
 
 
-def generating_function(z: Complex, lam: float, t: float) -> Complex:
-    """Evaluate ``G(t; z)`` for unit density and kernel.
+@lru_cache(maxsize=1024)
+def generating_function(lam: float, t: float) -> GeneratingFunction:
+    """Prepare ``G(t; z)`` for unit density and kernel.
 
     Parameters
     ----------
-    z : ndarray of complex
-        Points, off the real axis or above the radius of convergence of the steady state.
     lam : float
         Shattering rate.
     t : float
         Time, above 0 and finite.
-
-    Returns
-    -------
-    ndarray of complex
-        Of the shape of `z`.
     """
-    w, p = _finish(z, lam, *_advance(z, lam, t))
-    return 2 * lam * p / w
-
-
-@lru_cache(maxsize=64)
-def radius(lam: float, t: float) -> float:
-    """Radius of convergence of the series in `z`: the pole of G nearest to the origin.
-
-    It lies on the positive axis and falls with time to ``(1 + lam)**2 / (1 + 2 lam)``.
-
-    Parameters
-    ----------
-    lam, t : float
-
-    Returns
-    -------
-    float
-        From below, to one part in 1e9.
-    """
-    steady = (1 + lam) ** 2 / (1 + 2 * lam)
-    # The poles of G, zeros of w, lie at excesses of about 1 : 4 : 9 : ...; w is positive at first.
-    excess = np.geomspace(1e-9, 4 * (1 + 2 / t) / steady, 400)
-    while True:
-        z = (steady * (1 + excess)).astype(complex)
-        value = _finish(z, lam, *_advance(z, lam, t))[0].real
-        beyond = np.flatnonzero(~(value > 0))
-        first = int(beyond[0]) if beyond.size else excess.size - 1
-        if first == 0:
-            return steady
-        low, high = excess[first - 1], excess[first]
-        if high - low <= 1e-9 * (1 + low):
-            return steady * (1 + float(low))
-        excess = np.linspace(low, high, 33)
-
-
-def coefficients(lam: float, t: float, largest: int) -> Float:
-    """Densities ``n_0 = 0, n_1, ..., n_largest``, accurate relative to each for the upper half.
-
-    Cauchy's integral over a circle just inside the pole, by the trapezoidal rule (a Fourier
-    transform); its points avoid the real axis, where the exponents may differ by a whole number.
-
-    Parameters
-    ----------
-    lam : float
-        Shattering rate.
-    t : float
-        Time, above 0 and finite.
-    largest : int
-        Largest size.
-    """
-    circle = radius(lam, t) * math.exp(-_DEPTH / largest)
-    points = _OVER * largest
-    # w and theta w as power series in z: few terms, evaluated at all points by a transform
-    w, p, x, left = _advance(circle * np.exp(2j * np.pi / _TERMS * np.arange(_TERMS)), lam, t)
-    j = np.arange(_TERMS // 2)
-    shift = np.exp(1j * np.pi / points * j)
-    w, p = (
-        np.fft.ifft(np.fft.fft(f)[: _TERMS // 2].real * shift, points)[: points // 2]
-        for f in (w, p)
-    )
-    g = np.empty(points // 2, complex)
-    for start in range(0, g.size, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        angle = 2 * np.pi / points * (np.arange(start, min(start + _CHUNK, g.size)) + 0.5)
-        top, bottom = _finish(circle * np.exp(1j * angle), lam, w[part], p[part], x, left)[::-1]
-        g[part] = 2 * lam * top / bottom
-    k = np.arange(largest + 1)
-    # G at conjugate points is conjugate: the real part of the sum over the upper half
-    sums = np.fft.fft(g, points)[: largest + 1]
-    sums = 2 * (sums * np.exp(-1j * np.pi * k / points)).real / points
-    return sums * np.exp(-k * math.log(circle))
+    # The pole lies within 1 % above this, or below.
+    centre = (1 + lam) ** 2 / (1 + 2 * lam) + 2 / t
+    span = 2.1 * centre
+    angle = 2 * np.pi / _TERMS * np.arange(_TERMS)
+    w, p, x, left = _advance(centre + span * np.exp(1j * angle), lam, t)
+    w, p = (np.fft.fft(f)[: _TERMS // 2] / _TERMS for f in (w, p))
+    return GeneratingFunction(lam, centre, span, w.real, p.real, x, left)

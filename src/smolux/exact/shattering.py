@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from .base import Float, Solution
 from .constant import Constant
-from .generating import coefficients
+from .generating import generating_function
 from .special import log_central
 
 #: Gauss-Legendre rule of one panel
@@ -94,7 +94,8 @@ class ConstantShattering(Solution):
         for low, high in _bands(largest):
             inside = (k > low) & (k <= high)
             if inside.any():
-                n[inside] = _band(lam, t, high)[k[inside].astype(int)]
+                band = _small_band if high <= 1024 else _band
+                n[inside] = band(lam, t, high)[k[inside].astype(int)]
         power = 2 * (1 + lam) / (1 + 2 * lam)
         first = (lam + math.exp(-power * self._integral(t))) / (1 + lam)
         return np.where(k == 1, first, n)
@@ -122,8 +123,8 @@ def _bands(largest: int) -> list[tuple[int, int]]:
     return list(zip([0, *tops[:-1]], tops, strict=True))
 
 
-@lru_cache(maxsize=64)
 def _band(lam: float, t: float, high: int) -> Float:
-    n = coefficients(lam, t, high)
-    n.setflags(write=False)
-    return n
+    return generating_function(lam, t).coefficients(high)
+
+
+_small_band = lru_cache(maxsize=1024)(_band)
