@@ -176,6 +176,18 @@ def test_a_finished_run_goes_on_to_nothing(folder):
     assert "not the folder of a run" in call("run", ".", code=2).stderr
 
 
+def test_a_case_that_was_changed_is_no_case_to_go_on_with(folder):
+    call("run", "small.toml", "-o", "x", "-s", "solve.tolerance=1e-5")
+    file = folder / "x" / "case.toml"
+    text = file.read_text()
+    for old, new in (("500", "600"), ("scale = 1.0", "scale = 2.0"), ("1e-05", "1e-06")):
+        assert old in text
+        file.write_text(text.replace(old, new))
+        assert "was changed since the run was begun" in call("run", "x", code=2).stderr
+    file.write_text(text.replace("report = true", "report = false"))
+    call("run", "x")
+
+
 def test_a_run_with_the_solver_says_whether_they_agree(folder):
     result = call("run", "small.toml", "--set", "solve.tolerance=1e-6")
     assert "The simulation agrees with the solution of the rate equations" in result.stdout
@@ -333,6 +345,8 @@ def test_a_time_limit_stops_and_goes_on(folder):
     assert (folder / "cut" / "checkpoint.npz").is_file()
     assert "unfinished" in call("show", "cut").stdout
     text = (folder / "cut" / "case.toml").read_text()
+    (folder / "cut" / "case.toml").write_text(text.replace("seed = 7", "seed = 8"))
+    assert "was changed" in call("run", "cut", code=2).stderr
     (folder / "cut" / "case.toml").write_text(text.replace("time_limit = 0.01", "time_limit = 600"))
     call("run", "cut")
     assert not (folder / "cut" / "checkpoint.npz").exists()

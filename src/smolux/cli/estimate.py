@@ -248,6 +248,8 @@ def _gelation(case: Case) -> list[str]:
         "from then on one cluster holds a finite share of the mass: a simulation follows it (see "
         "'largest'), the rate equations lose it"
     )
+    if case.solve is not None and case.solve.gel == "inert":
+        after += '; to compare both, set solve.gel = "reacts"'
     if unit is None:
         return [f"the kernel gels, at a time that is not known; {after}"]
     if initial.largest > 1:

@@ -42,6 +42,15 @@ pre { background: var(--shade); padding: .8rem 1rem; overflow-x: auto; font-size
 """
 
 
+_CAPTIONS = {
+    "clusters": "Clusters per unit volume, and deviations in standard deviations.",
+    "moments": "Moments of the size distribution.",
+    "size-distribution": "Number densities over cluster size.",
+    "oscillations": "Second moment over time, and the cycle in the plane with the number density.",
+    "scaling": "Size distributions scaled by the mean size; one curve if growth is self-similar.",
+}
+
+
 def write(
     file: Path, case: Case, ds: Any, solution: Any = None, figures: Sequence[Path] = ()
 ) -> None:
@@ -153,10 +162,10 @@ def agreement(ds: Any, solution: Any) -> str:
 
 def _figure(file: Path) -> str:
     data = base64.b64encode(file.read_bytes()).decode("ascii")
-    name = escape(file.stem.replace("-", " "))
+    caption = escape(_CAPTIONS.get(file.stem, file.stem))
     return (
-        f'<figure><img alt="{name}" src="data:image/png;base64,{data}">'
-        f"<figcaption>{name}</figcaption></figure>"
+        f'<figure><img alt="{caption}" src="data:image/png;base64,{data}">'
+        f"<figcaption>{caption}</figcaption></figure>"
     )
 
 

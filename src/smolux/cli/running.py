@@ -13,11 +13,13 @@ from typing import Any
 
 import smolux
 
+from .. import checkpoint as checkpoints
 from .. import results
-from ..case import Case
+from ..case import Case, parse
 from ..deterministic import SolverError
 from ..deterministic.solve import solve
 from ..errors import InputError, Interrupted, SmoluxWarning
+from ..model_dict import model_to_dict
 from . import figures, report
 from .console import duration, say
 from .progress import Display
@@ -91,12 +93,12 @@ def _stages(
     ds, solution = None, None
     remarks: list[str] = []
     if case.run is not None:
-        ds = _finished(directory.results, directory.checkpoint)
+        ds = _finished(directory.results, case, directory.checkpoint)
         if ds is None:
             ds = _simulate(case, directory, stopper, display)
     if case.solve is not None:
         file = directory.results if ds is None else directory.solution
-        solution = _finished(file)
+        solution = _finished(file, case)
         try:
             solution = solution if solution is not None else _solve(case, file, display)
         except SolverError as error:
@@ -112,12 +114,54 @@ def _stages(
     return Outcome(ds, solution, [*remarks, *undrawn])
 
 
-def _finished(file: Path, checkpoint: Path | None = None) -> Any:
-    """Load results that are complete; None if there are none."""
-    if not file.is_file() or (checkpoint is not None and checkpoint.is_file()):
+def _finished(file: Path, case: Case, checkpoint: Path | None = None) -> Any:
+    """Load results that are complete; None if there are none.
+
+    Raises
+    ------
+    InputError
+        If they are those of another case.
+    """
+    if checkpoint is not None and checkpoint.is_file():
+        _check_plan(checkpoints.load(checkpoint)[0], case)
+        return None
+    if not file.is_file():
         return None
     ds = results.load(file)
-    return ds if ds.attrs.get("complete", 1) else None
+    if not ds.attrs.get("complete", 1):
+        return None
+    begun = parse(str(ds.attrs["case"])) if "case" in ds.attrs else case
+    settings = "run" if ds.attrs.get("method") != "solve" else "solve"
+    if begun.model != case.model or _data(begun, settings) != _data(case, settings):
+        raise InputError(_CHANGED)
+    return ds
+
+
+_CHANGED = (
+    "case.toml: was changed since the run was begun; put it back, or start a new run of it with -o "
+    "(checkpoint_every, time_limit and [output] may be changed)"
+)
+
+
+def _data(case: Case, settings: str) -> dict[str, Any]:
+    """Return the settings that decide on the data."""
+    return asdict(case.solve) if settings == "solve" and case.solve else _arguments(case)
+
+
+def _check_plan(plan: Any, case: Case) -> None:
+    """Check that a checkpoint belongs to the case.
+
+    Raises
+    ------
+    InputError
+        If it does not.
+    """
+    same = model_to_dict(plan.model) == model_to_dict(case.model)
+    for name, value in _arguments(case).items():
+        found = getattr(plan, "entropy" if name == "seed" else name)
+        same = same and getattr(found, "name", found) == value
+    if not same:
+        raise InputError(_CHANGED)
 
 
 def _simulate(

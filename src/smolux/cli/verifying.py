@@ -59,7 +59,7 @@ def row(finding: Finding) -> str:
         finding.check,
         finding.measured,
         finding.expected,
-        f"{finding.p:.2g}",
+        f"{finding.p:.2g}" if finding.p > 1e-3 else f"{finding.p:.0e}",
         "passed" if finding.passed else "FAILED",
         f"{finding.seconds:.1f} s",
     )
