@@ -1,0 +1,99 @@
+"""The code of examples, README and guides runs as it is written, with fewer particles."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import smolux as sx
+from smolux.case import parse
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = sorted((ROOT / "examples").glob("*/plot_*.py"))
+README = ROOT / "README.md"
+GUIDES = [
+    page
+    for folder in ("tutorials", "how-to")
+    for page in sorted((ROOT / "docs" / folder).glob("*.md"))
+    if "```python" in page.read_text(encoding="utf-8")
+]
+
+
+@pytest.fixture
+def small(monkeypatch, tmp_path):
+    """Limit what a computation costs, and collect the results."""
+    simulate, solve = sx.simulate, sx.solve
+    results = []
+
+    def small_simulation(model, times, **settings):
+        few = min(settings.get("particles", 100_000), 1000)
+        settings |= {"particles": few, "replicas": 3}
+        results.append(simulate(model, times, **settings))
+        return results[-1]
+
+    def coarse_solution(model, times, **settings):
+        results.append(solve(model, times, **settings | {"tolerance": 1e-4}))
+        return results[-1]
+
+    monkeypatch.setattr(sx, "simulate", small_simulation)
+    monkeypatch.setattr(sx, "solve", coarse_solution)
+    monkeypatch.chdir(tmp_path)
+    return results
+
+
+def check(results, folder):
+    """Results must be complete, finite and conserve mass; one figure must have been drawn."""
+    assert results
+    for ds in results:
+        mass = ds["moment"].sel(order=1)
+        np.testing.assert_allclose(mass, mass[0, 0], rtol=1e-6)
+        assert ds.attrs["complete"] == 1
+        assert np.isfinite(ds["number_density"]).all()
+    (figure,) = folder.glob("*.png")
+    assert figure.stat().st_size > 10_000
+
+
+def test_there_are_examples():
+    assert len(EXAMPLES) >= 4
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.parent.name)
+def test_example(example, small, tmp_path):
+    assert len(example.read_text(encoding="utf-8").splitlines()) < 40
+    runpy.run_path(str(example), run_name="__main__")
+    check(small, tmp_path)
+
+
+def blocks(page, language):
+    """Fenced code of a page."""
+    text = page.read_text(encoding="utf-8")
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+
+
+def test_readme_example(small, tmp_path):
+    (code,) = blocks(README, "python")
+    statements = [line for line in code.splitlines() if line.strip()]
+    assert len(statements) < 12
+    exec(compile(code, "README.md", "exec"), {"__name__": "__main__"})
+    check(small, tmp_path)
+
+
+def test_readme_case_file(small):
+    (text,) = blocks(README, "toml")
+    case = parse(text)
+    ds = sx.simulate(case.model, case.run.times, particles=case.run.particles, seed=case.run.seed)
+    assert ds.sizes["time"] == len(case.run.times)
+
+
+@pytest.mark.parametrize("page", GUIDES, ids=lambda path: path.stem)
+def test_code_of_a_guide(page, small, tmp_path):
+    """The blocks of a page run one after the other, as a reader would type them."""
+    model = sx.Model(kernel=sx.kernels.Constant())
+    sx.results.save(sx.simulate(model, [1.0], seed=1), tmp_path / "results.nc")
+    names = {"__name__": "__main__"}
+    for code in blocks(page, "python"):
+        exec(compile(code, page.name, "exec"), names)
