@@ -79,13 +79,20 @@ def test_mistakes_end_with_2_and_no_traceback(tmp_path):
     assert "Traceback" not in err
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Return the result of a run without a stop."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "long.toml").write_text(LONG)
+    code, _, err = finish(start("run", "long.toml", cwd=folder))
+    assert code == 0, err
+    return results.load(folder / "long" / "results.nc")
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_stops_without_loss(tmp_path, number):
+def test_a_signal_stops_without_loss(tmp_path, number, whole):
     (tmp_path / "long.toml").write_text(LONG)
-    whole = start("run", "long.toml", "-o", "whole", cwd=tmp_path)
-    assert finish(whole)[0] == 0
-
     process = start("run", "long.toml", "-o", "cut", cwd=tmp_path)
     checkpoint, before, stopped = tmp_path / "cut" / "checkpoint.npz", 0, 0
     for _ in range(2):  # once in the first run, once after it went on
@@ -105,8 +112,8 @@ def test_a_signal_stops_without_loss(tmp_path, number):
     code, _, err = finish(process)
     assert code == 0, err
     assert stopped >= 1
-    first, second = (results.load(tmp_path / n / "results.nc") for n in ("whole", "cut"))
-    assert first.equals(second)
+    second = results.load(tmp_path / "cut" / "results.nc")
+    assert whole.equals(second)
     assert second.attrs["complete"]
 
 

@@ -86,6 +86,7 @@ def test_mistakes_in_values_of_the_model_have_their_lines_too():
     ("old", "new", "line", "words"),
     [
         ("times = [1, 10.0]", "times = [10, 1]", 19, "must be zero or more and ascending"),
+        ("times = [1, 10.0]", "times = [1, 1]", 19, "must be zero or more and ascending"),
         ("times = [1, 10.0]", "times = [1, true]", 19, "run.times[1] = true: must be a number"),
         ("times = [1, 10.0]", "times = []", 19, "give at least one time"),
         ("times = [1, 10.0]", "times = [nan]", 19, "must be finite"),
