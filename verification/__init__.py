@@ -1,0 +1,1 @@
+"""Published results, computed again: slow, with figures and tables for the documentation."""
