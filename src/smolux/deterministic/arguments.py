@@ -17,8 +17,8 @@ Float = NDArray[np.float64]
 
 GELS = ("inert", "reacts")
 _TOLERANCES = 1e-12, 0.1
-#: largest windows by default
-_LIMIT, _DIRECT_LIMIT = 1 << 20, 1 << 13
+#: largest windows by default; for the direct sum, whose cost is quadratic, see `DIRECT_LIMIT`
+_LIMIT, DIRECT_LIMIT = 1 << 20, 1 << 13
 #: where a gel forms, and where only other processes keep one from forming
 _GEL_LIMIT, _HINDERED_LIMIT = 1 << 12, 1 << 16
 
@@ -29,8 +29,10 @@ class Settings:
 
     Attributes
     ----------
-    fixed : bool
-        Whether the number of sizes stays at `limit`.
+    limit : int
+        The largest number of sizes.
+    fixed, given : bool
+        Whether the number of sizes stays at `limit`, and whether that is the user's choice.
     """
 
     times: tuple[float, ...]
@@ -38,6 +40,7 @@ class Settings:
     tolerance: float
     limit: int
     fixed: bool
+    given: bool
     orders: Float
     sizes: int
     bins_per_octave: int
@@ -101,23 +104,24 @@ def check(
             )
     if problems:
         raise InputError(problems)
-    limit = largest or max_size or _default_limit(model, method)
+    limit = largest or max_size or _default_limit(model)
     return Settings(
         times=output,
         method=method,
         tolerance=float(tolerance),
         limit=int(limit),
         fixed=largest is not None,
+        given=largest is not None or max_size is not None,
         orders=powers,
         gel=gel,
         **counts,
     )
 
 
-def _default_limit(model: Model, method: str) -> int:
+def _default_limit(model: Model) -> int:
     if model.kernel.gels:
         return _GEL_LIMIT if len(model.processes) == 1 else _HINDERED_LIMIT
-    return _DIRECT_LIMIT if method == "direct" else _LIMIT
+    return _LIMIT
 
 
 def _is_number(value: Any) -> bool:

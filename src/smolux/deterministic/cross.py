@@ -16,7 +16,9 @@ Float = NDArray[np.float64]
 MAX_RANK = 48
 #: sizes on which pivots are sought: all small ones, and so many spread evenly in log k
 _SMALL, _NODES = 24, 192
-_SAMPLES = 4096
+#: pairs that factors are tried on: so many of a kind, and of so many sizes each
+_SAMPLES, _SIZES = 1024, 1 << 16
+_ROUNDS = 4
 #: entries below this share of the largest are only approximated to within it
 _FLOOR = 1e-6
 #: a 1 x 1 pivot is taken if it is at least this share of the largest entry (Bunch and Parlett 1971)
@@ -128,14 +130,14 @@ def cross_approximation(
     J. R. Bunch and B. N. Parlett, SIAM J. Numer. Anal. 8, 639 (1971), doi:10.1137/0708060 (pivots).
     """
     extra = np.empty(0, np.int64)
-    sample = Sample(kernel, largest)
-    for _ in range(3):
+    for attempt in range(_ROUNDS):
         nodes = _nodes(largest, extra)
         blocks = _eliminate(kernel, nodes, tolerance, power, max_rank)
         if blocks is None:
             return None
         rows, core = _extend(kernel, nodes, blocks, largest, power)
         factors = Factors(*_recompress(kernel, rows, core, tolerance, power), power)
+        sample = Sample(kernel, largest, attempt)
         errors = sample.errors(factors)
         worst = float(errors.max())
         if worst <= 10.0 * tolerance:
@@ -273,20 +275,23 @@ def _recompress(
 
 
 class Sample:
-    """Pairs of sizes on which factors are tried: uniform, uniform in the logarithm, small with any.
+    """Pairs of sizes on which factors are tried: every size with itself and with any, small with any.
 
     Attributes
     ----------
     i, j : ndarray of int64
     """
 
-    def __init__(self, kernel: Kernel, largest: int) -> None:
-        rng = np.random.default_rng(largest)
-        third = _SAMPLES // 3
-        uniform = rng.integers(1, largest + 1, (2, third))
-        spread = np.floor((largest + 1.0) ** rng.random((2, third))).astype(np.int64)
-        mixed = np.stack([rng.integers(1, min(largest, 64) + 1, third), uniform[1]])
-        self.i, self.j = np.minimum(np.concatenate([uniform, spread, mixed], axis=1), largest)
+    def __init__(self, kernel: Kernel, largest: int, seed: int = 0) -> None:
+        rng = np.random.default_rng([largest, seed])
+        each = rng.permutation(largest)[:_SIZES] + 1
+        any_size = rng.integers(1, largest + 1, each.size)
+        spread = np.floor((largest + 1.0) ** rng.random((2, _SAMPLES))).astype(np.int64)
+        small = rng.integers(1, min(largest, 64) + 1, _SAMPLES)
+        mixed = np.stack([small, rng.integers(1, largest + 1, _SAMPLES)])
+        paired = np.stack([np.tile(each, 2), np.concatenate([each, any_size])])
+        pairs = np.concatenate([paired, spread, mixed], axis=1)
+        self.i, self.j = np.minimum(pairs, largest)
         self._exact = kernel(self.i.astype(float), self.j.astype(float))
         floor = _FLOOR * max(float(np.abs(self._exact).max()), 1e-300)
         self._scale = np.abs(self._exact) + floor

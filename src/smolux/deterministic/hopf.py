@@ -80,7 +80,9 @@ def hopf_threshold(
     """
     if not 0 < low < high:
         raise InputError(f"low = {low!r}, high = {high!r}: must be positive and ascending")
-    rates = [float(np.clip(r, low * 1.01, high)) for r in _START]
+    rates = list(_START)
+    if not low <= min(rates) < max(rates) <= high:
+        rates = [low ** (1 / 3) * high ** (2 / 3), low ** (2 / 3) * high ** (1 / 3)]
     branch = _Branch(kernel)
     growth = [branch(rate).real for rate in rates]
     for _ in range(_ITERATIONS):
@@ -96,6 +98,8 @@ def hopf_threshold(
         if abs(new / rates[-2] - 1.0) <= tolerance:
             break
         growth.append(branch(new).real)
+    else:
+        raise SolverError(f"the onset of oscillations was not found; last tried {new:g}", np.inf)
     leading = _leading(branch.state)
     if leading.real > branch.value.real + 1e-6 * abs(branch.value):
         raise SolverError(

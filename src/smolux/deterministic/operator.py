@@ -22,6 +22,8 @@ _CACHE = 320 << 20
 _BLOCK = 1 << 22
 #: transforms of several densities at once up to this many numbers, one by one beyond
 _BATCH = 1 << 18
+#: number of sizes on which low rank is tried before anything is computed
+_TRIAL = 1024
 #: range of the exponential tilt over the window, as a power of e
 _TILT = 80.0
 #: seconds per number, of a transform per stage and of the direct sum; only their ratio matters
@@ -250,6 +252,11 @@ class OperatorFactory:
         self.kernel, self.method = kernel, method
         self.tolerance = float(np.clip(tolerance, 1e-13, 1e-6))
         self.notes: list[str] = []
+
+    @property
+    def direct(self) -> bool:
+        """Whether large windows will need the direct sum."""
+        return self.method == "direct" or self._low_rank(_TRIAL) is None
 
     def __call__(self, largest: int) -> Operator:
         """Return the operator for the sizes ``1 .. largest``."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError, Interrupted, SmoluxWarning
 from ..model import Model
 from ..results import to_dataset
-from .arguments import Settings, check
+from .arguments import DIRECT_LIMIT, Settings, check
 from .equations import Equations
 from .integrate import Integrator
 from .observe import Observer, Snapshot
@@ -96,7 +96,7 @@ def solve(
         Keep the sizes ``1 .. largest`` only; if left out, the number of sizes grows with the
         clusters.
     max_size : int, optional
-        The most sizes it may grow to; if left out 2**20, with method="direct" 2**13, and 2**12
+        The most sizes it may grow to; if left out 2**20, for the direct sum 2**13, and 2**12
         where a gel forms.
     orders : sequence of float
         Orders p of the moments ``M_p = sum_k k**p n_k``.
@@ -173,22 +173,21 @@ class _Run:
         self.model, self.settings, self.progress = model, settings, progress
         self.shots: list[Snapshot] = []
         self.started = self.told = time.perf_counter()
-        window = Window(
-            settings.limit,
-            max(3.0, float(settings.orders.max())),
-            settings.tolerance,
-            settings.fixed,
-        )
+        self.factory = OperatorFactory(model.kernel, settings.method, 0.1 * settings.tolerance)
+        self.limit = settings.limit
+        if not settings.given and self.limit > DIRECT_LIMIT and self.factory.direct:
+            self.limit = DIRECT_LIMIT
+        order = max(3.0, float(settings.orders.max()))
+        window = Window(self.limit, order, settings.tolerance, settings.fixed)
         start = model.initial.largest
-        if start > settings.limit and not settings.fixed:
+        if start > self.limit and not settings.fixed:
             raise InputError(
-                f"max_size = {settings.limit}: the initial sizes reach {start}; "
+                f"max_size = {self.limit}: the initial sizes reach {start}; "
                 "raise max_size, or give largest to leave out what lies beyond it"
             )
         sizes = window.first(start)
         n = model.initial.densities(max(sizes, start))
         mass = float(n @ np.arange(1.0, len(n) + 1.0))
-        self.factory = OperatorFactory(model.kernel, settings.method, 0.1 * settings.tolerance)
         self.equations = Equations(model, self.factory, sizes, mass, settings.gel == "reacts")
         self.observer = Observer(settings.orders, settings.sizes, settings.bins_per_octave, mass)
         self.integrator = Integrator(
@@ -273,4 +272,4 @@ class _Run:
             return f"after gelation this is the gel, and {effect}"
         if self.settings.fixed:
             return "leave out largest, so that the number of sizes grows, or raise it"
-        return f"raise max_size (now {self.settings.limit})"
+        return f"raise max_size (now {self.limit})"

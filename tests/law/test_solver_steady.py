@@ -1,0 +1,92 @@
+"""Steady states and the onset of oscillations against closed forms and reference values."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import gammaln
+
+import smolux as sx
+from smolux.deterministic import SolverError, eigenvalues, hopf_threshold, steady_state
+from smolux.errors import InputError
+
+
+def model(kernel, rate):
+    return sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(rate)])
+
+
+def catalan(k, lam):
+    """Return ``C(2k, k) / ((2k - 1) 4**k) ((1 + 2 lam) / (1 + lam)**2)**k``."""
+    ratio = np.log((1 + 2 * lam) / (1 + lam) ** 2)
+    logarithm = gammaln(2 * k + 1) - 2 * gammaln(k + 1) - k * np.log(4) + k * ratio
+    return np.exp(logarithm) / (2 * k - 1)
+
+
+def test_constant_kernel():
+    lam = 0.1
+    state = steady_state(model(sx.kernels.Constant(), lam))
+    k = np.arange(1.0, 201.0)
+    exact = 2 * lam * (1 + lam) / (1 + 2 * lam) * catalan(k, lam)
+    np.testing.assert_allclose(state.n[:200], exact, rtol=1e-8)
+    assert state.moment(0) == pytest.approx(2 * lam / (1 + 2 * lam), rel=1e-10)
+    assert state.moment(2) == pytest.approx(61, rel=1e-8)
+    assert state.moment(1) == pytest.approx(1, rel=1e-12)
+
+
+def test_multiplicative_kernel():
+    lam = 0.3
+    state = steady_state(model(sx.kernels.Multiplicative(), lam))
+    k = np.arange(1.0, 101.0)
+    np.testing.assert_allclose(state.n[:100], (1 + lam) * catalan(k, lam) / k, rtol=1e-8)
+    assert state.moment(2) == pytest.approx((1 + 2 * lam) / (2 * lam), rel=1e-9)
+
+
+def test_steady_state_stays():
+    case = model(sx.kernels.Brownian(), 0.2)
+    state = steady_state(case)
+    sizes = {int(k): float(n) for k, n in zip(state.sizes, state.n, strict=True) if n > 1e-18}
+    start = sx.Model(case.kernel, case.processes, sx.initial.from_sizes(sizes))
+    ds = sx.solve(start, [0.0, 5.0])
+    np.testing.assert_allclose(ds["moment"][0, 1], ds["moment"][0, 0], rtol=1e-7)
+
+
+def test_eigenvalues_are_those_of_the_jacobian():
+    case = model(sx.kernels.GeneralizedBrownian(0.9), 0.1)
+    state = steady_state(case)
+    m = len(state.n)
+    k = state.sizes
+    K = case.kernel(k[:, None], k[None, :])
+    loss = K @ state.n
+    dense = -1.1 * (np.diag(loss) + state.n[:, None] * K)
+    for d in range(1, m):
+        i = np.arange(d, m)
+        dense[i, i - d] += K[d - 1, i - d] * state.n[d - 1]
+    dense[0] += 0.1 * (k * loss + (k * state.n) @ K)
+    exact = np.linalg.eigvals(dense)
+    exact = exact[np.abs(exact) > 1e-6]
+    exact = exact[np.argsort(-exact.real)]
+    found = eigenvalues(state, 4)
+    np.testing.assert_allclose(found[:4].real, exact[:4].real, rtol=1e-6)
+    np.testing.assert_allclose(np.abs(found[:4].imag), np.abs(exact[:4].imag), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("a", "rate", "period"), [(1.0, 0.015380, 19.8108), (0.9, 0.009620, 37.7738)]
+)
+def test_hopf_thresholds(a, rate, period):
+    # reference/hopf_thresholds.csv; given to 1e-6
+    found = hopf_threshold(sx.kernels.GeneralizedBrownian(a), tolerance=1e-5)
+    assert found.rate == pytest.approx(rate, abs=1e-6)
+    assert found.period == pytest.approx(period, rel=1e-4)
+    assert abs(found.eigenvalue.real) < 1e-4 * abs(found.eigenvalue)
+
+
+def test_mistakes():
+    with pytest.raises(InputError, match="aggregation alone"):
+        steady_state(sx.Model(sx.kernels.Constant()))
+    with pytest.raises(InputError, match="depends on time"):
+        steady_state(model(sx.kernels.Constant(), "0.1 + 0.01 * t"))
+    with pytest.raises(InputError, match="ascending"):
+        hopf_threshold(sx.kernels.Constant(), low=0.1, high=0.01)
+    with pytest.raises(SolverError, match="stable"):
+        hopf_threshold(sx.kernels.Constant(), low=0.2, high=0.3)
