@@ -2,7 +2,7 @@
 
 from .hopf import HopfThreshold, hopf_threshold
 from .integrate import SolverError
-from .solve import Progress, solve
+from .solver import Progress, solve
 from .steady import SteadyState, eigenvalues, steady_state
 
 __all__ = [

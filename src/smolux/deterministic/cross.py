@@ -275,7 +275,7 @@ def _recompress(
 
 
 class Sample:
-    """Pairs of sizes on which factors are tried: every size with itself and with any, small with any.
+    """Pairs of sizes on which factors are tried: each with itself, each with any, small with any.
 
     Attributes
     ----------

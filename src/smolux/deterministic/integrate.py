@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .equations import Equations
-from .radau import ESTIMATE_ORDER, ORDER, STAGES, TABLEAU, Step, extrapolate, radau_step
+from .radau import ESTIMATE_POWER, STAGES, STEP_POWER, TABLEAU, Step, extrapolate, radau_step
 from .window import Window
 
 Float = NDArray[np.float64]
@@ -94,7 +94,7 @@ class Integrator:
         self.steps = self.rejected = 0
         self.corrected = 0.0
         #: the estimate is of lower order than the step (Hairer and Wanner 1996, section IV.8)
-        self._allowed = 0.1 * tolerance ** (ESTIMATE_ORDER / ORDER)
+        self._allowed = 0.1 * tolerance ** (ESTIMATE_POWER / STEP_POWER)
         self._before: tuple[float, Float] | None = None
         self._norm = Norm(orders, equations.sizes)
         equations.operator.prepare(n)
@@ -157,7 +157,7 @@ class Integrator:
             return
         n = self.n + step.change[-1]
         error = self._norm(step.error, n) / self._allowed
-        factor = _SAFETY * max(error, 1e-10) ** (-1.0 / ESTIMATE_ORDER)
+        factor = _SAFETY * max(error, 1e-10) ** (-1.0 / ESTIMATE_POWER)
         if step.contraction > 0:
             factor = min(factor, max(0.5, _CONTRACTION / step.contraction))
         if self._careful:

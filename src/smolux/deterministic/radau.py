@@ -82,8 +82,9 @@ class _Tableau:
 
 
 TABLEAU = _Tableau(STAGES)
-#: order of the error estimate, and of the step
-ESTIMATE_ORDER, ORDER = STAGES + 1, 2 * STAGES
+ORDER = 2 * STAGES - 1
+#: powers of the step length in the error of a step, and in its estimate
+STEP_POWER, ESTIMATE_POWER = ORDER + 1, STAGES + 1
 
 
 def extrapolate(change: Float, ratio: float) -> Float:
