@@ -111,7 +111,7 @@ def simulate(
         Called with a `Progress` a few times a second.
     checkpoint : path, optional
         File for checkpoints, written every `checkpoint_every` seconds and when the run is
-        stopped. Removed at the end.
+        stopped. Left in place at the end: delete it when the result is saved.
     checkpoint_every : float
         Seconds between checkpoints.
     time_limit : float, optional
@@ -175,7 +175,7 @@ def resume(
     Parameters
     ----------
     checkpoint : path
-        As written by `simulate`; kept up to date, and removed at the end.
+        As written by `simulate`; kept up to date.
     model : Model, optional
         Needed only if the kernel or a rate is a Python function.
     executor, progress, checkpoint_every, time_limit
@@ -279,10 +279,7 @@ class _Run:
                 self._dataset(),
                 self.checkpoint,
             )
-        ds = self._dataset()
-        if self.checkpoint is not None:
-            self.checkpoint.unlink(missing_ok=True)
-        return ds
+        return self._dataset()
 
     def _drive(self) -> str:
         """Advance all groups; return why it stopped early, or nothing."""

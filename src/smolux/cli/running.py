@@ -195,6 +195,8 @@ def _simulate(
             raise Interrupted(f"{str(stop).partition(';')[0]}{share}") from None
         stopper.patient = True
     _store(ds, case, directory.results)
+    # not before: whatever happens between, the run can go on from it
+    directory.checkpoint.unlink(missing_ok=True)
     say(
         f"simulated in {duration(float(ds.attrs['wall_seconds']))}"
         f" ({duration(float(ds.attrs['compile_seconds']))} of it compiling)"
