@@ -21,6 +21,8 @@ _TOLERANCES = 1e-12, 0.1
 _LIMIT, DIRECT_LIMIT = 1 << 20, 1 << 13
 #: where a gel forms, and where only other processes keep one from forming
 _GEL_LIMIT, _HINDERED_LIMIT = 1 << 12, 1 << 16
+#: at least so many times the largest size at the start
+_ROOM = 8
 
 
 @dataclass(frozen=True)
@@ -119,9 +121,10 @@ def check(
 
 
 def _default_limit(model: Model) -> int:
-    if model.kernel.gels:
-        return _GEL_LIMIT if len(model.processes) == 1 else _HINDERED_LIMIT
-    return _LIMIT
+    if not model.kernel.gels:
+        return _LIMIT
+    limit = _GEL_LIMIT if len(model.processes) == 1 else _HINDERED_LIMIT
+    return max(limit, _ROOM * model.initial.largest)
 
 
 def _is_number(value: Any) -> bool:

@@ -143,10 +143,9 @@ class LowRank:
         self.largest = m = gain.rows.shape[1]
         self._length = fft.next_fast_len(2 * m - 1, real=True)
         self.sizes = np.arange(1.0, m + 1.0)
-        self._rows, self._back = gain.rows, 0.5 * self.sizes**gain.power
         diagonal = np.diag(gain.core)
         self._diagonal = diagonal if np.array_equal(gain.core, np.diag(diagonal)) else None
-        self.theta = 0.0
+        self._tilt(0.0)
 
     def loss(self, n: Float) -> Float:
         """See `Operator.loss`."""
@@ -185,6 +184,11 @@ class LowRank:
         if n is None:
             self._tilt(0.0)
             return
+        theta, m = self._best_tilt(n), self.largest
+        if abs(theta - self.theta) * m >= 1.0:
+            self._tilt(theta)
+
+    def _best_tilt(self, n: Float) -> float:
         m = self.largest
         k = np.unique(np.round(np.geomspace(1, m, 96)).astype(int))
         width = np.gradient(k.astype(float)) if len(k) > 1 else np.ones(1)
@@ -203,11 +207,9 @@ class LowRank:
                 noise - 2 * theta * sizes
             )
 
-        self._tilt(_minimise(cost, 0.0, _TILT / m))
+        return _minimise(cost, 0.0, _TILT / m)
 
     def _tilt(self, theta: float) -> None:
-        if abs(theta - self.theta) * self.largest < 1.0:
-            return
         self.theta, m = theta, self.largest
         self._rows = self._gain.rows * np.exp(theta * (self.sizes - 0.5 * m))
         self._back = 0.5 * self.sizes**self._gain.power * np.exp(-theta * (self.sizes - m))

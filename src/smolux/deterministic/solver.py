@@ -176,7 +176,7 @@ class _Run:
         self.factory = OperatorFactory(model.kernel, settings.method, 0.1 * settings.tolerance)
         self.limit = settings.limit
         if not settings.given and self.limit > DIRECT_LIMIT and self.factory.direct:
-            self.limit = DIRECT_LIMIT
+            self.limit = max(DIRECT_LIMIT, 2 * model.initial.largest)
         order = max(3.0, float(settings.orders.max()))
         window = Window(self.limit, order, settings.tolerance, settings.fixed)
         start = model.initial.largest
