@@ -74,7 +74,7 @@ if TYPE_CHECKING:
     )
     from . import plotting as plot
     from .analysis.summary import summary
-    from .deterministic.solve import solve
+    from .deterministic.solver import solve
     from .errors import InputError, Interrupted, SmoluxWarning
     from .model import Model
     from .stochastic import resume, simulate

@@ -49,7 +49,7 @@ def test_every_public_name_is_there(name):
 def test_names_are_the_objects_they_stand_for():
     assert smolux.plot is smolux.plotting
     assert smolux.simulate.__module__ == "smolux.stochastic"
-    assert smolux.solve.__module__ == "smolux.deterministic.solve"
+    assert smolux.solve.__module__ == "smolux.deterministic.solver"
     assert callable(smolux.summary)
 
 

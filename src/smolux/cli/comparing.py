@@ -13,7 +13,7 @@ import smolux
 from .. import analysis
 from ..case import Case
 from ..deterministic import SolverError
-from ..deterministic.solve import solve
+from ..deterministic.solver import solve
 from ..errors import InputError, did_you_mean
 from ..methods import METHODS
 from . import console

@@ -17,7 +17,7 @@ from .. import checkpoint as checkpoints
 from .. import results
 from ..case import Case, parse
 from ..deterministic import SolverError
-from ..deterministic.solve import solve
+from ..deterministic.solver import solve
 from ..errors import InputError, Interrupted, SmoluxWarning
 from ..model_dict import model_to_dict
 from . import figures, report
