@@ -49,8 +49,11 @@ def cache_directory() -> Path | None:
     given = os.environ.get("SMOLUX_CACHE_DIR")
     if given is not None:
         return Path(given) if given else None
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "smolux"
+    base = os.environ.get("XDG_CACHE_HOME")
+    try:
+        return Path(base or Path.home() / ".cache") / "smolux"
+    except RuntimeError:  # no home
+        return None
 
 
 class _Digest:
@@ -111,18 +114,25 @@ class _Digest:
         self._seen[id(fn)] = len(self._seen)
         self._code(fn.__code__)
         self.add(fn.__defaults__ or ())
+        names = _names(fn.__code__)
         for cell in fn.__closure__ or ():
-            self.add(cell.cell_contents)
-        for name in _names(fn.__code__):
-            if name not in fn.__globals__:
-                continue
-            value = fn.__globals__[name]
-            self._text(f"global {name}")
-            self.add(value)
-            if isinstance(value, types.ModuleType) and not _installed(value):
-                for attribute in fn.__code__.co_names:
-                    if hasattr(value, attribute):
-                        self.add(getattr(value, attribute))
+            self._reached(cell.cell_contents, names)
+        for name in names:
+            if name in fn.__globals__:
+                self._text(f"global {name}")
+                self._reached(fn.__globals__[name], names)
+
+    def _reached(self, value: Any, names: list[str]) -> None:
+        """Add a value; of a module of the user also what may be taken from it by one of `names`."""
+        self.add(value)
+        if isinstance(value, types.ModuleType) and not _installed(value):
+            if id(value) in self._seen:
+                return
+            self._seen[id(value)] = len(self._seen)
+            for name in names:
+                if hasattr(value, name):
+                    self._text(f"attribute {name}")
+                    self._reached(getattr(value, name), names)
 
 
 def _names(code: types.CodeType) -> list[str]:
@@ -197,7 +207,8 @@ if _HOOKS:
             if not self._enabled or not self._impl.check_cachable(data):
                 return
             path = self._path(sig, data.codegen)
-            with contextlib.suppress(OSError):  # a full or read-only disk costs time, not the run
+            # a full or read-only disk, or code that cannot be written, costs time, not the run
+            with contextlib.suppress(Exception):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 fd, temporary = tempfile.mkstemp(dir=path.parent)
                 try:

@@ -258,20 +258,20 @@ class AcceptanceRejection(Method):
         self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int
     ) -> Work:
         """See `Method.new_work`."""
-        stored = [int(counts[sizes > 1].sum()) for sizes, counts in populations]
+        total = np.array([counts.sum() for _, counts in populations])
+        monomers = np.array([c[0] if s[0] == 1 else 0 for s, c in populations])
+        stored = total - monomers
         # enough without growth: half of the monomers merge in pairs
-        capacity = max(
-            max(m, int(counts.sum()) // 2)
-            for m, (_, counts) in zip(stored, populations, strict=True)
-        )
+        capacity = int(np.maximum(stored, total // 2).max())
         array = np.zeros((len(populations), capacity + 8), np.int64)
-        for r, (sizes, counts) in enumerate(populations):
-            above = sizes > 1
-            spread(sizes[above], counts[above], array[r, : stored[r]])
-            count = state.count[r]
-            count[MONOMERS] = counts[~above].sum()
-            count[STORED], count[PARTICLES] = stored[r], counts.sum()
-            count[SMALLEST], count[LARGEST] = sizes[0], sizes[-1]
+        for r in np.flatnonzero(stored):
+            sizes, counts = populations[r]
+            first = int(sizes[0] == 1)
+            spread(sizes[first:], counts[first:], array[r, : stored[r]])
+        count = state.count
+        count[:, MONOMERS], count[:, STORED], count[:, PARTICLES] = monomers, stored, total
+        count[:, SMALLEST] = [sizes[0] for sizes, _ in populations]
+        count[:, LARGEST] = [sizes[-1] for sizes, _ in populations]
         ahead = np.full((len(populations), 2 * _AHEAD), -1.0)
         edges = level_edges()
         levels = len(edges) - 1

@@ -389,14 +389,18 @@ class Inverse(Method):
         # no size can exceed the mass, so small systems need few buckets
         buckets = min(self.buckets, max(BLOCK, 2 * mass))
         number = np.zeros((replicas, buckets))
-        stored = [int(counts[sizes > buckets].sum()) for sizes, counts in populations]
+        # how many of the sizes, which ascend, have a bucket
+        held = [int(np.searchsorted(sizes, buckets, side="right")) for sizes, _ in populations]
+        stored = [int(c[h:].sum()) for h, (_, c) in zip(held, populations, strict=True)]
         large = np.zeros((replicas, max(*stored, 8) * 2), np.int64)
         for r, (sizes, counts) in enumerate(populations):
-            above = sizes > buckets
-            number[r, sizes[~above] - 1] = counts[~above]
-            spread(sizes[above], counts[above], large[r, : stored[r]])
-            count = state.count[r]
-            count[STORED], count[PARTICLES], count[LARGEST] = stored[r], counts.sum(), sizes[-1]
+            number[r, sizes[: held[r]] - 1] = counts[: held[r]]
+            if stored[r]:
+                spread(sizes[held[r] :], counts[held[r] :], large[r, : stored[r]])
+        count = state.count
+        count[:, STORED] = stored
+        count[:, PARTICLES] = [counts.sum() for _, counts in populations]
+        count[:, LARGEST] = [sizes[-1] for sizes, _ in populations]
         given = rates.table(buckets)
         valid = (given >= 0.0) & (given < np.inf)
         table = np.vstack((np.where(valid, given, 0.0), np.zeros((3, buckets))))

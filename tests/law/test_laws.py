@@ -1,0 +1,97 @@
+"""Every method obeys every law."""
+
+from __future__ import annotations
+
+import csv
+from collections import defaultdict
+from pathlib import Path
+
+import laws
+import numpy as np
+import pytest
+
+import smolux as sx
+
+DATA = Path(__file__).parent.parent / "reference" / "data"
+METHODS = [method.name for method in sx.methods.METHODS]
+
+every_method = pytest.mark.parametrize("method", METHODS)
+
+
+@pytest.mark.parametrize("shattering", [0.0, 0.1])
+@pytest.mark.parametrize("law", laws.LAWS)
+@every_method
+def test_whole_distribution(method: str, law: str, shattering: float) -> None:
+    laws.whole_distribution(method, law, shattering)
+
+
+@every_method
+def test_distribution_with_a_rate_that_depends_on_time(method: str) -> None:
+    laws.distribution_in_time(method, "0.4 * (1 + sin(5 * t))", lambda t: 0.4 * (1 + np.sin(5 * t)))
+
+
+@every_method
+def test_waiting_times(method: str) -> None:
+    laws.waiting_times(method)
+
+
+@every_method
+def test_first_collision(method: str) -> None:
+    laws.first_collision(method)
+
+
+@pytest.mark.parametrize("law", ["constant", "additive"])
+@every_method
+def test_fluctuations(method: str, law: str) -> None:
+    laws.fluctuations(method, law)
+
+
+@pytest.mark.parametrize(
+    ("law", "times"),
+    [("constant", [1, 10]), ("additive", [0.5, 1.5]), ("bilinear", [0.2, 0.5])],
+)
+@every_method
+def test_aggregation(method: str, law: str, times: list[float]) -> None:
+    laws.aggregation(method, law, times)
+
+
+@every_method
+def test_shattering(method: str) -> None:
+    laws.shattering(method)
+
+
+@every_method
+def test_ballistic_with_shattering(method: str) -> None:
+    reference: dict[float, dict[int, float]] = defaultdict(dict)
+    for row in csv.DictReader((DATA / "ballistic_shatter_lam0.01_moments.csv").open()):
+        reference[float(row["t"])] = {k: float(row[f"M{k}"]) for k in (0, 2, 3)}
+    ds = laws.against(method, {t: reference[t] for t in (1.0, 10.0)})
+    for row in csv.DictReader((DATA / "ballistic_shatter_lam0.01_nk.csv").open()):
+        size = int(row["k"])
+        if size in (1, 2, 5, 20):
+            laws.agree(ds["n"].sel(size=size), [float(row[f"n_k(t={t})"]) for t in (1, 10)], size)
+
+
+@every_method
+def test_gelation(method: str) -> None:
+    laws.gelation(method)
+
+
+@pytest.mark.parametrize("population", ["doubling", "fixed-volume"])
+@pytest.mark.parametrize("law", ["additive", "ballistic"])
+@every_method
+def test_mass(method: str, law: str, population: str) -> None:
+    laws.mass(method, law, population)
+
+
+@pytest.mark.parametrize("law", ["additive", "ballistic"])
+def test_methods_agree(law: str) -> None:
+    laws.agreement(METHODS, law)
+
+
+def test_few_buckets() -> None:
+    # what are large particles for few buckets are counted by size for many
+    few = sx.methods.Inverse(buckets=4)
+    laws.whole_distribution(few, "ballistic", 0.1)
+    laws.mass(few, "ballistic", "doubling")
+    laws.agreement([few, sx.methods.Inverse()], "ballistic")
