@@ -102,12 +102,12 @@ def test_a_signal_stops_without_loss(tmp_path, number, whole):
         code, _, err = finish(process)
         assert "Traceback" not in err
         if code == 3:
-            stopped += 1
             assert err.splitlines()[-1] == "go on with: smolux run cut"
             ds = results.load(tmp_path / "cut" / "results.nc")
-            assert not ds.attrs["complete"]
-            assert checkpoint.is_file()
-            before = written(checkpoint, 0)
+            if not ds.attrs["complete"]:  # else it came when only figures were missing
+                stopped += 1
+                assert checkpoint.is_file()
+                before = written(checkpoint, 0)
         process = start("run", "cut", cwd=tmp_path)
     code, _, err = finish(process)
     assert code == 0, err
