@@ -141,6 +141,7 @@ def plain(value: Any) -> Any:
 
 
 def _draw(figure: Figure, path: Path) -> None:
+    figure.draw_without_rendering()  # ticks settle, so that the layout leaves room for them
     for dpi in (200, 150, 110):
         save(figure, path, dpi=dpi)
         if path.stat().st_size < _LARGEST:

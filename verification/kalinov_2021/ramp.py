@@ -17,7 +17,7 @@ _SAMPLES = (2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
 
 
 def compute(quick: bool) -> dict[str, Any]:
-    end, particles, runs = (10.0, 1000, 4) if quick else (200.0, 8_000, 6)
+    end, particles, runs = (10.0, 1000, 4) if quick else (200.0, 2_500, 4)
     physics = brownian(0.9, RATE, spread=True)
     times = np.arange(1.0, end + 0.5)
     fine = np.arange(0.5, end + 0.25, 0.5)
