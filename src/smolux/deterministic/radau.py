@@ -63,7 +63,8 @@ class _Tableau:
     def __init__(self, stages: int) -> None:
         polynomial = np.zeros(stages + 1)
         polynomial[[stages - 1, stages]] = -1.0, 1.0
-        self.nodes = 0.5 * (np.sort(legendre.legroots(polynomial)) + 1.0)
+        # they are real; from NumPy 2.5 on all roots come as complex numbers
+        self.nodes = 0.5 * (np.sort(legendre.legroots(polynomial).real) + 1.0)
         self.nodes[-1] = 1.0
         powers = np.vander(self.nodes, increasing=True)
         order = np.arange(1, stages + 1)
