@@ -24,8 +24,8 @@ formula = sx.kernels.formula(
     shear=0.02,
 )
 
-times = np.linspace(0.5, 8, 16)
-simulated = sx.simulate(sx.Model(kernel=function), times, particles=20_000, seed=1)
+times = np.linspace(0.25, 4, 16)
+simulated = sx.simulate(sx.Model(kernel=function), times, particles=50_000, seed=1)
 solved = sx.solve(sx.Model(kernel=formula), times)
 
 figure = sx.plot.moments(simulated, reference=solved)

@@ -35,8 +35,8 @@ class Case:
 
 
 CASES = (
-    Case("a", 0.95, 0.01, 16_000, 3, 300.0, 5e-6),
-    Case("b", 0.98, 0.005, 4_000, 3, 300.0, 5e-5),
+    Case("a", 0.95, 0.01, 8_000, 3, 300.0, 5e-6),
+    Case("b", 0.98, 0.005, 2_000, 3, 300.0, 5e-5),
 )
 #: the rate equations are observed more often, to locate extrema
 _FINE = 0.25
