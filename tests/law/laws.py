@@ -289,21 +289,28 @@ def against(method: Any, reference: dict[float, dict[int, float]], seed: int = 9
 
 
 def gelation(method: Any, seed: int = 10) -> None:
-    """The multiplicative kernel up to its gel point in a large system, and past it in a small one.
+    """The multiplicative kernel through its gel point, in a fixed volume: a random graph.
 
-    Past it one giant cluster reacts with the rest, and the finite law holds exactly.
+    Against the exact means of a finite system, where the gel is one giant cluster. Its share tends
+    to 1 - x, x = exp(-t (1 - x)): the gel reacts (Flory).
     """
-    particles, replicas, t = 20_000, 32, 1.5
+    particles, replicas, times = 150, 600, (0.8, 1.5)
     ds = finite(
-        "multiplicative", [0.8], method, particles=particles, replicas=replicas, seed=seed, sizes=32
-    )
-    _means(ds, solution("multiplicative"), (0, 2, 3), (1, 2, 5))
-    assert (ds["largest"].values < 0.05 * particles).all()
-    few = finite("multiplicative", [t], method, particles=100, replicas=2000, seed=seed, sizes=32)
-    law = exact.finite.law("multiplicative", 100)
-    assert law.second_moment(t) == pytest.approx(32.1504951492)
-    agree(few["moment"].sel(order=2).values[:, 0], law.second_moment(t), "sol and gel")
-    agree(few["particles"].values[:, 0], law.number_mean(t), "number")
+        "multiplicative", times, method, particles=particles, replicas=replicas, seed=seed,
+        sizes=particles,
+    )  # fmt: skip
+    law = exact.finite.law("multiplicative", particles)
+    agree(ds["particles"].values, [law.number_mean(t) for t in times], "clusters")
+    agree(ds["moment"].sel(order=2).values, [law.second_moment(t) for t in times], "M2")
+    for k, t in enumerate(times):
+        for low, high in ((1, 2), (2, 3), (3, 10), (10, 50), (50, 100), (100, 151)):
+            expected = law.counts(t, np.arange(low, high)).sum()
+            found = ds["n"].values[:, k, low - 1 : high - 1].sum(axis=1) * particles
+            if expected * replicas > 300:
+                agree(found, expected, (t, low, high))
+    share = ds["largest"].values.mean(axis=0) / particles
+    assert share[0] < 0.3
+    assert abs(share[1] - (1 - 0.417188356134)) < 0.05
 
 
 # --- what has no exceptions ----------------------------------------------------------------------
