@@ -5,14 +5,20 @@ here is, and answers with old code when only a callee was edited (numba issue 18
 an entry on everything that decides the machine code: bytecode, constants, defaults, closure cells
 and the globals reached, recursively through every function called. It hooks in where Numba's own
 does; should those private names be gone, compilation still works, only slower to start.
+
+Symbols need names that no other process gives. Numba numbers the functions it compiles from 1 in
+every process, and of two symbols of one name the linker takes the first: a loop from the disk would
+run the code of another loop, silently. So the numbers begin at random here.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import itertools
 import os
 import pickle
+import secrets
 import tempfile
 import types
 from collections.abc import Callable
@@ -23,10 +29,11 @@ import numba
 import numpy as np
 
 try:
+    from numba.core.bytecode import FunctionIdentity
     from numba.core.caching import CompileResultCacheImpl, _Cache
     from numba.core.serialize import dumps
 
-    _HOOKS = all(
+    _HOOKS = hasattr(FunctionIdentity, "_unique_ids") and all(
         hasattr(CompileResultCacheImpl, m) for m in ("reduce", "rebuild", "check_cachable")
     )
 except ImportError:  # a later Numba: compile without a cache
@@ -39,6 +46,9 @@ _NO_COUNTING = (
 
 #: pieces are called from compiled code only; to call one from Python, take its ``py_func``
 _NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+#: raised whenever what an entry holds changes
+_FORMAT = 2
 
 #: compile seconds and cache hits of this process, for reports
 statistics = {"hits": 0, "misses": 0}
@@ -62,6 +72,9 @@ class _Digest:
     def __init__(self) -> None:
         self._hash = hashlib.sha256()
         self._seen: dict[int, int] = {}
+        #: what is known by its address, which must not pass to another object
+        self._kept: list[Any] = []
+        self._taken: set[tuple[int, str]] = set()
 
     def hexdigest(self) -> str:
         return self._hash.hexdigest()
@@ -94,9 +107,13 @@ class _Digest:
             self._text(
                 f"type {value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
             )
+        elif type(value).__module__.startswith("numba.") and hasattr(value, "__wrapped__"):
+            self._text(type(value).__name__)  # of numba.vectorize, numba.cfunc
+            self.add(value.__wrapped__)
         else:  # numbers, strings, None, builtins: their text says it all
             name = getattr(value, "__qualname__", None)
-            self._text(f"{type(value).__name__} {name or repr(value)}")
+            home = getattr(value, "__module__", "")
+            self._text(f"{type(value).__name__} {f'{home}.{name}' if name else repr(value)}")
 
     def _text(self, text: str) -> None:
         self._hash.update(text.encode() + b"\0")
@@ -112,6 +129,7 @@ class _Digest:
             self._text(f"again {self._seen[id(fn)]}")
             return
         self._seen[id(fn)] = len(self._seen)
+        self._kept.append(fn)
         self._code(fn.__code__)
         self.add(fn.__defaults__ or ())
         names = _names(fn.__code__)
@@ -126,11 +144,11 @@ class _Digest:
         """Add a value; of a module of the user also what may be taken from it by one of `names`."""
         self.add(value)
         if isinstance(value, types.ModuleType) and not _installed(value):
-            if id(value) in self._seen:
-                return
-            self._seen[id(value)] = len(self._seen)
             for name in names:
-                if hasattr(value, name):
+                # each function may take something else from the same module
+                if hasattr(value, name) and (id(value), name) not in self._taken:
+                    self._taken.add((id(value), name))
+                    self._kept.append(value)
                     self._text(f"attribute {name}")
                     self._reached(getattr(value, name), names)
 
@@ -156,6 +174,18 @@ def digest(fn: Callable[..., Any]) -> str:
 
 
 if _HOOKS:
+
+    def _renumber() -> None:
+        """Give the functions compiled from here on numbers of their own."""
+        FunctionIdentity._unique_ids = itertools.count(secrets.randbits(62))
+
+    _renumber()
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=_renumber)
+
+    def _unmistakable(description: Any) -> bool:
+        """Whether the number is part of the symbol's name."""
+        return f"v{description.uid}" in description.mangled_name
 
     class _ContentCache(_Cache):
         """One file for each function content, signature and processor."""
@@ -183,9 +213,8 @@ if _HOOKS:
         def _path(self, sig: Any, codegen: Any) -> Path:
             if self._content is None:
                 self._content = digest(self._dispatcher)
-            key = repr(
-                (self._content, str(sig), codegen.magic_tuple(), numba.__version__, np.__version__)
-            )
+            versions = _FORMAT, numba.__version__, np.__version__
+            key = repr((self._content, str(sig), codegen.magic_tuple(), versions))
             return self._directory / f"{hashlib.sha256(key.encode()).hexdigest()[:40]}.nbc"
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -204,11 +233,13 @@ if _HOOKS:
 
         def save_overload(self, sig: Any, data: Any) -> None:
             statistics["misses"] += 1
-            if not self._enabled or not self._impl.check_cachable(data):
-                return
-            path = self._path(sig, data.codegen)
             # a full or read-only disk, or code that cannot be written, costs time, not the run
             with contextlib.suppress(Exception):
+                if not (
+                    self._enabled and self._impl.check_cachable(data) and _unmistakable(data.fndesc)
+                ):
+                    return
+                path = self._path(sig, data.codegen)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 fd, temporary = tempfile.mkstemp(dir=path.parent)
                 try:
