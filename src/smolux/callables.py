@@ -5,7 +5,7 @@ from __future__ import annotations
 import builtins
 import inspect
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 from types import BuiltinFunctionType, FunctionType, SimpleNamespace
@@ -182,13 +182,31 @@ def wrong_number(value: Any, where: str) -> list[str]:
     return [] if np.isfinite(value) else [f"{where} = {value!r}: must be a finite number"]
 
 
-@lru_cache(maxsize=256)
 def _for_arrays(function: FunctionType) -> Callable[..., Any]:
     """Copy a function so that `math`, `min` and `max` work on arrays and intervals.
 
-    The functions that it calls by a global name are copied likewise.
+    The functions that it calls by a global name are copied likewise. A global that is given another
+    value, as in a notebook, makes another copy.
     """
-    return _copy(function, {})
+    return _copied(function, tuple(_globals(function, {})))
+
+
+@lru_cache(maxsize=256)
+def _copied(function: FunctionType, _: tuple[int, ...]) -> Callable[..., Any]:
+    return _copy(function, {})  # which holds the globals, so that their addresses stay theirs
+
+
+def _globals(function: FunctionType, done: dict[FunctionType, None]) -> Iterator[int]:
+    """Addresses of the global values that a function reaches."""
+    if function in done:
+        return
+    done[function] = None
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        called = getattr(value, "py_func", value)
+        yield id(value)
+        if isinstance(called, FunctionType) and not called.__module__.startswith("numpy"):
+            yield from _globals(called, done)
 
 
 def _copy(function: FunctionType, done: dict[FunctionType, FunctionType]) -> FunctionType:
