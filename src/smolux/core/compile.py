@@ -28,6 +28,8 @@ from typing import Any
 import numba
 import numpy as np
 
+from . import pipeline
+
 try:
     from numba.core.bytecode import FunctionIdentity
     from numba.core.caching import CompileResultCacheImpl, _Cache
@@ -265,6 +267,8 @@ def piece(fn: Callable[..., Any] | None = None, /, **options: Any) -> Any:
         **_NO_COUNTING,
         **options,
     }
+    if settings["no_cpython_wrapper"] and settings.get("_nrt") is False:
+        settings |= pipeline.options()
     compiler = numba.njit(**settings)
     return compiler if fn is None else compiler(fn)
 
