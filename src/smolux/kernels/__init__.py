@@ -9,6 +9,7 @@ from .constant import Constant
 from .formula_kernel import FormulaKernel, formula
 from .function import FunctionKernel, from_function
 from .generalized_brownian import GeneralizedBrownian
+from .majorant import Majorant
 from .multiplicative import Multiplicative
 from .product import Product
 from .registry import by_name, from_dict
@@ -40,6 +41,7 @@ __all__ = [
     "FunctionKernel",
     "GeneralizedBrownian",
     "Kernel",
+    "Majorant",
     "Multiplicative",
     "Product",
     "Sedimentation",

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import Float, Kernel, check_parameters, corners
+from .majorant import Majorant
 
 
 def _rate(i: Any, j: Any, scale: Any) -> Any:
@@ -59,3 +60,7 @@ class Additive(Kernel):
         """See `Kernel.factors`; rank 2."""
         one = np.ones(len(sizes))
         return self.scale * np.array([sizes, one]), np.array([one, sizes])
+
+    def majorant(self) -> Majorant:
+        """See `Kernel.majorant`; the law itself, ``A(i, j) = scale i``."""
+        return Majorant(((self.scale, 1.0, 0.0),), least=1.0)

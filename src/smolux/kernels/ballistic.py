@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import BOLTZMANN, Float, Kernel, check_parameters, check_positive, widen
+from .majorant import Majorant
 
 
 def _rate(i: Any, j: Any, scale: Any) -> Any:
@@ -96,3 +97,13 @@ class Ballistic(Kernel):
         upper = np.maximum(np.maximum(self(a, c), self(a, d)), np.maximum(self(b, c), self(b, d)))
         j = np.clip(_RATIO * a, c, d)
         return widen(self(np.clip(_RATIO * j, a, b), j), upper)
+
+    def majorant(self) -> Majorant:
+        """See `Kernel.majorant`; Osinsky (2023), eq. (25).
+
+        ``A(i, j) = scale (i^{1/3} + j^{1/3})^2 i^{-1/2}``, as the root of a sum is at most the sum
+        of the roots, and at least that over the root of two.
+        """
+        third = 1.0 / 3.0
+        terms = ((1.0, 1.0 / 6.0, 0.0), (2.0, -1.0 / 6.0, third), (1.0, -0.5, 2.0 * third))
+        return Majorant(tuple((self.scale * w, p, q) for w, p, q in terms), least=math.sqrt(0.5))

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from smolux.errors import InputError
 
+from .majorant import Majorant
+
 Float = NDArray[np.float64]
 
 #: Boltzmann constant in J/K, exact in the SI
@@ -110,6 +112,13 @@ class Kernel:
         """Factors ``u, v`` of shape (rank, sizes), ``K(i, j) = sum_r u[r, i] v[r, j]``, or None.
 
         Only exact, finite-rank laws answer; for others the solver finds a cross approximation.
+        """
+        return None
+
+    def majorant(self) -> Majorant | None:
+        """Return a majorant of low rank that holds for all sizes from 1 on; None if none is known.
+
+        Methods that need one then find one from `bounds`.
         """
         return None
 

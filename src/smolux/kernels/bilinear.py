@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import Float, Kernel, check_parameters, corners
+from .majorant import Majorant
 
 
 def _rate(i: Any, j: Any, A: Any, B: Any, scale: Any) -> Any:
@@ -85,3 +86,8 @@ class Bilinear(Kernel):
         one = np.ones(len(sizes))
         left = np.array([one + self.A * sizes, self.A + self.B * sizes])
         return self.scale * left, np.array([one, sizes])
+
+    def majorant(self) -> Majorant:
+        """See `Kernel.majorant`; the law itself."""
+        terms = ((0.5, 0.0, 0.0), (self.A, 1.0, 0.0), (0.5 * self.B, 1.0, 1.0))
+        return Majorant(tuple((self.scale * w, p, q) for w, p, q in terms if w > 0), least=1.0)

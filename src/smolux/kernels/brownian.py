@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import BOLTZMANN, Float, Kernel, check_parameters, check_positive, ratios, widen
+from .majorant import Majorant
 
 
 def _rate(i: Any, j: Any, dimension: Any, scale: Any) -> Any:
@@ -91,3 +92,8 @@ class Brownian(Kernel):
         power = np.asarray(sizes, float) ** (1.0 / self.dimension)
         one = np.ones(len(power))
         return self.scale * np.array([2 * one, power, 1 / power]), np.array([one, 1 / power, power])
+
+    def majorant(self) -> Majorant:
+        """See `Kernel.majorant`; the law itself, ``A(i, j) = scale (1 + (i/j)^{1/D})``."""
+        power = 1.0 / self.dimension
+        return Majorant(((self.scale, 0.0, 0.0), (self.scale, power, -power)), least=1.0)

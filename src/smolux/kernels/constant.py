@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import Float, Kernel, check_parameters
+from .majorant import Majorant
 
 
 def _rate(i: Any, j: Any, scale: Any) -> Any:
@@ -60,3 +61,7 @@ class Constant(Kernel):
         """See `Kernel.factors`; rank 1."""
         one = np.ones((1, len(sizes)))
         return self.scale * one, one
+
+    def majorant(self) -> Majorant:
+        """See `Kernel.majorant`; the law itself."""
+        return Majorant(((self.scale / 2, 0.0, 0.0),), least=1.0)

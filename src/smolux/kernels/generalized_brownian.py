@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import Float, Kernel, check_parameters, ratios, widen
+from .majorant import Majorant
 
 
 def _rate(i: Any, j: Any, a: Any, scale: Any) -> Any:
@@ -67,3 +68,7 @@ class GeneralizedBrownian(Kernel):
         """See `Kernel.factors`; rank 2."""
         power = np.asarray(sizes, float) ** self.a
         return self.scale * np.array([power, 1 / power]), np.array([1 / power, power])
+
+    def majorant(self) -> Majorant:
+        """See `Kernel.majorant`; the law itself, ``A(i, j) = scale (i/j)^a``."""
+        return Majorant(((self.scale, self.a, -self.a),), least=1.0)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import Float, Kernel, check_parameters, corners
+from .majorant import Majorant
 
 
 def _rate(i: Any, j: Any, scale: Any) -> Any:
@@ -65,3 +66,7 @@ class Multiplicative(Kernel):
         """See `Kernel.factors`; rank 1."""
         sizes = np.asarray(sizes, float)[None]
         return self.scale * sizes, sizes
+
+    def majorant(self) -> Majorant:
+        """See `Kernel.majorant`; the law itself."""
+        return Majorant(((self.scale / 2, 1.0, 1.0),), least=1.0)

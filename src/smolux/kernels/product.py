@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import Float, Kernel, check_parameters, corners
+from .majorant import Majorant
 
 
 def _rate(i: Any, j: Any, mu: Any, scale: Any) -> Any:
@@ -74,3 +75,7 @@ class Product(Kernel):
         """See `Kernel.factors`; rank 1."""
         power = (np.asarray(sizes, float) ** self.mu)[None]
         return self.scale * power, power
+
+    def majorant(self) -> Majorant:
+        """See `Kernel.majorant`; the law itself."""
+        return Majorant(((self.scale / 2, self.mu, self.mu),), least=1.0)

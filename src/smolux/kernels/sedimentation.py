@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import Float, Kernel, check_parameters, check_positive, widen
+from .majorant import Majorant
 
 
 def _rate(i: Any, j: Any, scale: Any) -> Any:
@@ -114,3 +115,12 @@ class Sedimentation(Kernel):
         second = np.minimum(self(a, c), self(b, c))  # if c > b
         lower = np.where(a > d, first, np.where(c > b, second, 0.0))
         return widen(lower, upper)
+
+    def majorant(self) -> Majorant:
+        """See `Kernel.majorant`; ``A(i, j) = scale (i^{4/3} + 2 i j^{1/3})``.
+
+        With ``x > y`` the cube roots of the sizes the law is
+        ``(x + y)^3 (x - y) = x^4 + 2 x^3 y - 2 x y^3 - y^4``.
+        """
+        third = 1.0 / 3.0
+        return Majorant(((self.scale, 4.0 * third, 0.0), (2.0 * self.scale, 1.0, third)))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .base import Float, Kernel, check_parameters, check_positive, corners
+from .majorant import Majorant
 
 
 def _rate(i: Any, j: Any, scale: Any) -> Any:
@@ -81,3 +82,9 @@ class Shear(Kernel):
         x, one = np.cbrt(sizes), np.ones(len(sizes))
         left = np.array([sizes, 3 * x * x, 3 * x, one])
         return self.scale * left, np.array([one, x, x * x, sizes])
+
+    def majorant(self) -> Majorant:
+        """See `Kernel.majorant`; the law itself, ``A(i, j) = scale (i + 3 i^{2/3} j^{1/3})``."""
+        third = 1.0 / 3.0
+        terms = ((self.scale, 1.0, 0.0), (3.0 * self.scale, 2.0 * third, third))
+        return Majorant(terms, least=1.0)

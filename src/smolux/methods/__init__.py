@@ -3,8 +3,9 @@
 from .acceptance_rejection import AcceptanceRejection
 from .base import Method
 from .inverse import Inverse
+from .low_rank import FictitiousJumps, LowRank
 
 #: every method
-METHODS: tuple[type[Method], ...] = (AcceptanceRejection, Inverse)
+METHODS: tuple[type[Method], ...] = (AcceptanceRejection, Inverse, LowRank, FictitiousJumps)
 
-__all__ = ["METHODS", "AcceptanceRejection", "Inverse", "Method"]
+__all__ = ["METHODS", "AcceptanceRejection", "FictitiousJumps", "Inverse", "LowRank", "Method"]

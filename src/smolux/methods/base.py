@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..core.loop import Pieces
 from ..core.state import State
+from ..kernels.majorant import Majorant
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -31,6 +32,8 @@ class Rates:
         Whether reading a table costs as much as computing the rate.
     rigorous : bool
         Whether `bounds` is proved.
+    majorant : Majorant, optional
+        A majorant of low rank for all sizes, if one is known.
     """
 
     parameters: tuple[float, ...]
@@ -38,6 +41,7 @@ class Rates:
     bounds: Callable[..., tuple[Float, Float]]
     cheap: bool
     rigorous: bool
+    majorant: Majorant | None = None
 
     def table(self, largest: int) -> Float:
         """Rates of the sizes ``1 .. largest`` with each other."""

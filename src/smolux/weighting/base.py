@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.base import Kernel
+from ..kernels.majorant import Majorant
 
 Float = NDArray[np.float64]
 
@@ -35,6 +36,10 @@ class Weighting:
     def bounds(self, kernel: Kernel) -> Callable[..., tuple[Float, Float]]:
         """Return the bounds of the simulated rate, see `smolux.kernels.base.Kernel.bounds`."""
         raise NotImplementedError
+
+    def majorant(self, kernel: Kernel) -> Majorant | None:
+        """Return a majorant of the simulated rate; None if none is known, see `bounds` then."""
+        return None
 
     def stands_for(self, sizes: Float) -> Float:
         """How many physical particles a simulated particle of each size stands for."""

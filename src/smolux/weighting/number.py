@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..kernels.base import Kernel
+from ..kernels.majorant import Majorant
 from .base import Float, Weighting
 
 
@@ -33,6 +34,10 @@ class Number(Weighting):
     def bounds(self, kernel: Kernel) -> Callable[..., tuple[Float, Float]]:
         """See `Weighting.bounds`."""
         return kernel.bounds
+
+    def majorant(self, kernel: Kernel) -> Majorant | None:
+        """See `Weighting.majorant`."""
+        return kernel.majorant()
 
     def stands_for(self, sizes: Float) -> Float:
         """See `Weighting.stands_for`."""

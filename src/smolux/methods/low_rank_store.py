@@ -1,0 +1,265 @@
+"""Particles in slots of nearly equal sizes, as the low-rank method holds them.
+
+The small sizes have a slot each, which is counted; the particles of a wider slot lie one after
+another in a stretch of one array. A stretch that is full moves to the end of the array; when the
+end is reached, all move together again, with new gaps. Their order within a slot never changes, so
+nothing depends on where they lie.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.compile import cold_piece, piece
+from ..core.loop import tally_one
+from ..core.slots import slot_of
+from ..core.state import LARGEST, PARTICLES, SINCE, STORED
+
+# Entries of Work.meta.
+STAGE = 0  # row of the tables in force; -1: the tree is to be built
+TAIL = 1  # end of the last stretch of the pool
+SLOTS_NEEDED = 2  # what `grow` is asked for
+POOL_NEEDED = 3
+WANTED = 4  # row of the tables that `supply_bound` is asked for
+METAS = 8
+
+
+class Work(NamedTuple):
+    """Particles and sums for C slots, F powers; tables for S stages.
+
+    Attributes
+    ----------
+    number : float64 array of shape (R, C)
+        Particles in each slot (whole numbers).
+    tree : float64 array of shape (R, F, T)
+        Segment trees over ``number * factor``, see `smolux.core.segment_tree`.
+    levels : int64 array
+        Where their levels begin.
+    start, room, order : int64 arrays of shape (R, C)
+        The stretch of each slot; the slots by where their stretches begin, as of the last move.
+    pool : int64 array of shape (R, P)
+        Sizes of the particles of the wider slots.
+    chosen : int64 array of shape (R, 4)
+        Slot and place of both partners of the pending event.
+    meta : int64 array of shape (R, 8)
+    mix : float64 array of shape (R, F)
+        Scratch for majorants of mixed sign.
+    factor : float64 array of shape (S, slots, F)
+        Bounds of the factors over each slot.
+    share : float64 array of shape (S, slots)
+        ``K >= share_a share_b`` times the majorant in the slots a and b.
+    weight : float64 array of shape (S, terms)
+    term : int64 array of shape (S, terms, 2)
+        Left and right factor of each term.
+    rank : int64 array of shape (S, 3)
+        Factors and terms in use; 1 for mixed signs. Zeros where nothing is known yet.
+    bound : float64 array of shape (slots, slots), or empty
+        Bounds of the kernel for pairs of slots, if the majorant is made of them; NaN until needed.
+    bits : int64 array of shape (1,)
+        See `smolux.core.slots`.
+    """
+
+    number: np.ndarray
+    tree: np.ndarray
+    levels: np.ndarray
+    start: np.ndarray
+    room: np.ndarray
+    order: np.ndarray
+    pool: np.ndarray
+    chosen: np.ndarray
+    meta: np.ndarray
+    mix: np.ndarray
+    factor: np.ndarray
+    share: np.ndarray
+    weight: np.ndarray
+    term: np.ndarray
+    rank: np.ndarray
+    bound: np.ndarray
+    bits: np.ndarray
+
+
+@piece
+def view(w, r):
+    """Work arrays of one replica."""
+    return Work(
+        w.number[r],
+        w.tree[r],
+        w.levels,
+        w.start[r],
+        w.room[r],
+        w.order[r],
+        w.pool[r],
+        w.chosen[r],
+        w.meta[r],
+        w.mix[r],
+        w.factor,
+        w.share,
+        w.weight,
+        w.term,
+        w.rank,
+        w.bound,
+        w.bits,
+    )
+
+
+@piece
+def counted(w):
+    """Slots below this hold one size each."""
+    return np.int64(2) << w.bits[0]
+
+
+@piece
+def size_at(w, slot, place):
+    """Size of a particle."""
+    return slot if slot < counted(w) else w.pool[w.start[slot] + place]
+
+
+@piece
+def remove(s, w, slot, place):
+    """Take a particle out: the last of its slot moves into the gap."""
+    w.number[slot] -= 1.0
+    if slot >= counted(w):
+        first = w.start[slot]
+        w.pool[first + place] = w.pool[first + np.int64(w.number[slot])]
+        s.count[STORED] -= 1
+
+
+@piece
+def insert(s, w, slot, size, count):
+    """Put particles into a slot that has room for them."""
+    n = np.int64(w.number[slot])
+    w.number[slot] += count
+    s.count[PARTICLES] += count
+    if size > s.count[LARGEST]:
+        s.count[LARGEST] = size
+    if slot >= counted(w):
+        first = w.start[slot] + n
+        w.pool[first] = size
+        for k in range(1, count):
+            w.pool[first + k] = size
+        s.count[STORED] += count
+
+
+@piece
+def has_room(w, slot, count):
+    """Whether so many more particles fit in a slot as it lies."""
+    return slot < counted(w) or np.int64(w.number[slot]) + count <= w.room[slot]
+
+
+@cold_piece
+def make_room(s, w, slot, count):
+    """Move stretches until there is room; False if the pool is too small."""
+    needed = np.int64(w.number[slot]) + count
+    room = needed + needed // 4 + 8
+    stored = s.count[STORED]
+    if w.meta[TAIL] + room > w.pool.shape[0] and w.pool.shape[0] >= stored + stored // 4 + 2 * room:
+        _respace(s, w, 1)
+        if needed <= w.room[slot]:
+            return True
+    if w.meta[TAIL] + room > w.pool.shape[0]:
+        w.meta[POOL_NEEDED] = stored + stored // 2 + 4 * room + 1024
+        return False
+    new = w.meta[TAIL]
+    for k in range(np.int64(w.number[slot])):
+        w.pool[new + k] = w.pool[w.start[slot] + k]
+    w.start[slot], w.room[slot] = new, room
+    w.meta[TAIL] = new + room
+    return True
+
+
+@cold_piece
+def _respace(s, w, copies):
+    """Lay all stretches one after another, each with a gap, every particle `copies` times."""
+    slots = w.order.shape[0]
+    for k in range(1, slots):  # nearly sorted: only a few have moved to the end since
+        slot, m = w.order[k], k
+        while m > 0 and w.start[w.order[m - 1]] > w.start[slot]:
+            w.order[m] = w.order[m - 1]
+            m -= 1
+        w.order[m] = slot
+    end = np.int64(0)
+    first = counted(w)
+    for k in range(slots):
+        slot = w.order[k]
+        n = np.int64(w.number[slot]) if slot >= first else np.int64(0)
+        for m in range(n):
+            w.pool[end + m] = w.pool[w.start[slot] + m]
+        w.start[slot] = end
+        end += n
+    # half of what is free goes into the gaps, in proportion, the rest stays at the end
+    total = copies * s.count[STORED]
+    gap = min(0.5 * (w.pool.shape[0] - total) / max(total, 1), 0.25)
+    end = np.int64(0)
+    for k in range(slots):
+        slot = w.order[k]
+        n = np.int64(w.number[slot]) * copies if slot >= first else np.int64(0)
+        w.room[slot] = n + np.int64(gap * n)
+        end += w.room[slot]
+    w.meta[TAIL] = end
+    for k in range(slots - 1, -1, -1):
+        slot = w.order[k]
+        n = np.int64(w.number[slot]) if slot >= first else np.int64(0)
+        old = w.start[slot]
+        end -= w.room[slot]
+        w.start[slot] = end
+        for m in range(n - 1, -1, -1):
+            size = w.pool[old + m]
+            for c in range(copies - 1, -1, -1):
+                w.pool[end + c * n + m] = size
+
+
+@cold_piece
+def double(s, w):
+    """Put every particle in once more; twice a sum is exactly the sum of twice."""
+    stored = s.count[STORED]
+    if stored > 0:
+        if 2 * stored > w.pool.shape[0]:
+            w.meta[POOL_NEEDED] = 2 * stored + stored // 2 + 64
+            return False
+        _respace(s, w, 2)
+    for slot in range(w.number.shape[0]):
+        w.number[slot] *= 2.0
+    for row in range(w.tree.shape[0]):
+        for node in range(w.tree.shape[1]):
+            w.tree[row, node] *= 2.0
+    s.count[STORED] *= 2
+    s.count[PARTICLES] *= 2
+    return True
+
+
+@cold_piece
+def visit(s, w, t, grid):
+    """Count all particles, for output."""
+    largest = np.int64(0)
+    for slot in range(w.number.shape[0]):
+        n = np.int64(w.number[slot])
+        if n > 0 and slot < counted(w):
+            tally_one(t, grid, np.int64(slot), n)
+            largest = max(largest, np.int64(slot))
+        elif n > 0:
+            for k in range(w.start[slot], w.start[slot] + n):
+                tally_one(t, grid, w.pool[k], 1)
+                largest = max(largest, w.pool[k])
+    return largest
+
+
+@cold_piece
+def rescan(s, w):
+    """Take the largest size afresh, to within its slot."""
+    s.count[SINCE] = 0
+    slot = np.int64(w.number.shape[0] - 1)
+    while slot > 1 and w.number[slot] == 0.0:
+        slot -= 1
+    largest = slot
+    if slot >= counted(w):
+        for k in range(w.start[slot], w.start[slot] + np.int64(w.number[slot])):
+            largest = max(largest, w.pool[k])
+    s.count[LARGEST] = largest
+
+
+@piece
+def slot_for(w, size):
+    """Slot of a size."""
+    return slot_of(size, w.bits[0])
