@@ -100,6 +100,7 @@ def rates_for(model: Model, weighting: Weighting) -> Rates:
         weighting.bounds(kernel),
         kernel.cheap,
         kernel.rigorous,
+        weighting.majorant(kernel),
     )
 
 
