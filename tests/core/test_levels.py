@@ -22,7 +22,7 @@ def test_edges():
     assert EDGES.dtype == np.int64
     # no wider than an eighth of an octave, but for whole numbers
     upper, lower = EDGES[1:].astype(float), EDGES[:-1].astype(float)
-    assert (upper < (lower * 2 ** (1 / 8) + 1) * (1 + 1e-12)).all()
+    assert (upper < (lower + 1) * 2 ** (1 / 8) * (1 + 1e-12)).all()
     assert set(2 ** np.arange(62)) <= set(EDGES.tolist())
 
 

@@ -185,9 +185,11 @@ if _HOOKS:
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=_renumber)
 
-    def _unmistakable(description: Any) -> bool:
-        """Whether the number is part of the symbol's name."""
-        return f"v{description.uid}" in description.mangled_name
+    def _lasting(data: Any) -> bool:
+        """Whether code works in another process, beside that of others."""
+        numbered = f"v{data.fndesc.uid}" in data.fndesc.mangled_name
+        # a function that calls itself is bound by its address in this process
+        return numbered and ".numba.unresolved$" not in data.library.get_llvm_str()
 
     class _ContentCache(_Cache):
         """One file for each function content, signature and processor."""
@@ -237,9 +239,7 @@ if _HOOKS:
             statistics["misses"] += 1
             # a full or read-only disk, or code that cannot be written, costs time, not the run
             with contextlib.suppress(Exception):
-                if not (
-                    self._enabled and self._impl.check_cachable(data) and _unmistakable(data.fndesc)
-                ):
+                if not (self._enabled and self._impl.check_cachable(data) and _lasting(data)):
                     return
                 path = self._path(sig, data.codegen)
                 path.parent.mkdir(parents=True, exist_ok=True)
