@@ -121,18 +121,26 @@ def load(path: str | Path, model: Model | None = None) -> tuple[Plan, list[Group
     except FileNotFoundError:
         raise InputError(f"checkpoint = {str(path)!r}: there is no such file") from None
     except _UNREADABLE as error:
-        raise InputError(
-            f"checkpoint = {str(path)!r}: is none, or damaged ({type(error).__name__}: {error})"
-        ) from error
+        raise _damaged(path, error) from error
     if version != VERSION:
         raise InputError(
             f"checkpoint = {str(path)!r}: has version {version}, this smolux reads "
             f"{VERSION}; go on with the smolux that wrote it"
         )
-    if model is not None and model_to_dict(model) != meta["plan"]["model"]:
-        raise InputError(f"model: is not the one of the checkpoint {str(path)!r}")
-    plan = _plan_from_dict(meta["plan"], model)
-    return plan, [_group(plan, k, about, arrays) for k, about in enumerate(meta["groups"])]
+    try:
+        if model is not None and model_to_dict(model) != meta["plan"]["model"]:
+            raise InputError(f"model: is not the one of the checkpoint {str(path)!r}")
+        plan = _plan_from_dict(meta["plan"], model)
+        return plan, [_group(plan, k, about, arrays) for k, about in enumerate(meta["groups"])]
+    except InputError:
+        raise
+    except _UNREADABLE as error:
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: str | Path, error: Exception) -> InputError:
+    reason = f"{type(error).__name__}: {error}"
+    return InputError(f"checkpoint = {str(path)!r}: is none, or damaged ({reason})")
 
 
 def _group(plan: Plan, k: int, about: dict[str, Any], arrays: dict[str, np.ndarray]) -> Group:

@@ -1,0 +1,217 @@
+"""A run that is stopped goes on from its checkpoint as if nothing had happened."""
+
+from __future__ import annotations
+
+import json
+import pickletools
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import runs
+
+import smolux as sx
+from smolux import checkpoint as checkpoints
+from smolux import replicas
+from smolux.errors import InputError, Interrupted
+
+every_method = pytest.mark.parametrize("method", runs.METHODS)
+TIMES = [0.0, 0.3, 1.0, 2.0]
+SETTINGS: dict[str, Any] = {"particles": 2000, "replicas": 3, "seed": 5, "sizes": 40}
+
+
+@pytest.fixture
+def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(replicas, "_SLICE", 1e-9)  # return to Python as often as can be
+    return tmp_path / "run.npz"
+
+
+def simulate(method: str = runs.METHODS[0], rate: Any = runs.VARYING, **settings: Any) -> Any:
+    return sx.simulate(runs.model(rate), TIMES, method=method, **SETTINGS | settings)
+
+
+def stopped(path: Path, method: str = runs.METHODS[0], **settings: Any) -> Interrupted:
+    with pytest.raises(Interrupted) as caught:
+        simulate(method, checkpoint=path, time_limit=1e-9, **settings)
+    return caught.value
+
+
+def go_on(path: Path, most: int = 10_000, **settings: Any) -> tuple[Any, int]:
+    """Resume until the end; return the dataset and how often the run was stopped."""
+    for stops in range(most):
+        try:
+            return sx.resume(path, time_limit=1e-9, **settings), stops
+        except Interrupted:
+            continue
+    raise AssertionError("a run that is stopped again and again must come to its end")
+
+
+@pytest.mark.parametrize("distribution", [False, True])
+@every_method
+def test_stopped_again_and_again(method: str, distribution: bool, path: Path) -> None:
+    expected = simulate(method, distribution=distribution)
+    stop = stopped(path, method, distribution=distribution)
+    assert "time limit" in str(stop)
+    assert str(path) in str(stop)
+    assert stop.checkpoint == path
+    part = stop.dataset
+    assert not part.attrs["complete"]
+    assert np.isnan(part["collisions"].isel(time=-1)).all()
+    ds, stops = go_on(path)
+    assert stops >= 2
+    assert ds.attrs["complete"]
+    assert json.loads(ds.attrs["warnings"]) == []
+    runs.assert_same(expected, ds)
+    assert expected.attrs["events"] == ds.attrs["events"]
+    # what was reached before is part of it
+    reached = ~np.isnan(part["collisions"].values)
+    np.testing.assert_array_equal(
+        part["collisions"].values[reached], ds["collisions"].values[reached]
+    )
+
+
+def test_interrupted_from_the_keyboard(path: Path) -> None:
+    def press(progress: Any) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match="interrupted") as caught:
+        simulate(checkpoint=path, progress=press)
+    assert caught.value.checkpoint == path
+    ds, _ = go_on(path)
+    runs.assert_same(simulate(), ds)
+
+
+def test_an_error_of_progress_is_not_swallowed(path: Path) -> None:
+    def fail(progress: Any) -> None:
+        raise ZeroDivisionError("of the user")
+
+    with pytest.raises(ZeroDivisionError, match="of the user"):
+        simulate(checkpoint=path, progress=fail)
+
+
+def test_without_a_checkpoint() -> None:
+    with pytest.raises(Interrupted) as caught:
+        simulate(particles=100_000, time_limit=1e-9)
+    assert caught.value.checkpoint is None
+    assert caught.value.dataset["n"].sizes["time"] == len(TIMES)
+
+
+def test_a_checkpoint_now_and_then(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    written = []
+    save = checkpoints.save
+    monkeypatch.setattr(checkpoints, "save", lambda *a: (written.append(1), save(*a)))
+    ds = simulate(checkpoint=path, checkpoint_every=1e-9)
+    assert len(written) > 2
+    runs.assert_same(simulate(), ds)
+    # the latest leads to the same end
+    runs.assert_same(ds, sx.resume(path))
+
+
+# --- files that are none -------------------------------------------------------------------------
+
+
+def one_message(path: Path, *words: str, **settings: Any) -> None:
+    with pytest.raises(InputError) as caught:
+        sx.resume(path, **settings)
+    (message,) = caught.value.problems
+    for word in words:
+        assert word in message
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    one_message(tmp_path / "none.npz", "none.npz", "no such file")
+
+
+def test_damaged_files(path: Path) -> None:
+    stopped(path)
+    whole = path.read_bytes()
+    broken = path.with_name("broken.npz")
+    step = max(len(whole) // 40, 1)
+    cuts = [whole[:n] for n in range(0, len(whole), step)]
+    middle = len(whole) // 2
+    changed = whole[:middle] + bytes(255 - b for b in whole[middle : middle + 200])
+    for content in (*cuts, b"text", changed + whole[middle + 200 :]):
+        broken.write_bytes(content)
+        one_message(broken, "broken.npz", "damaged")
+
+
+def edited(path: Path, **changes: Any) -> None:
+    """Write a checkpoint anew with other entries of its description."""
+    with np.load(path) as file:
+        arrays = dict(file)
+    meta = json.loads(arrays["meta"].tobytes())
+    for key, change in changes.items():
+        meta[key] = change(meta[key])
+    arrays["meta"] = np.frombuffer(json.dumps(meta).encode(), np.uint8)
+    np.savez(path, **arrays)
+
+
+def test_another_version(path: Path) -> None:
+    stopped(path)
+    edited(path, version=lambda v: v + 1)
+    one_message(path, "run.npz", f"version {checkpoints.VERSION + 1}")
+
+
+def test_another_model(path: Path) -> None:
+    stopped(path)
+    one_message(path, "model", "run.npz", model=runs.model(0.3))
+    runs.assert_same(simulate(), go_on(path, model=runs.model(runs.VARYING))[0])
+
+
+def test_unknown_method(path: Path) -> None:
+    stopped(path)
+    edited(path, plan=lambda p: p | {"method": {"name": "invers"}})
+    one_message(path, "invers", "did you mean 'inverse'?")
+
+
+@pytest.mark.parametrize("lost", ["0/state/rng", "0/codes", "0/tally/counts", "0/windows/edges"])
+def test_an_array_is_missing(path: Path, lost: str) -> None:
+    stopped(path)
+    with np.load(path) as file:
+        arrays = {name: values for name, values in file.items() if name != lost}
+    np.savez(path, **arrays)
+    one_message(path, "run.npz", "damaged")
+
+
+# --- what is written -----------------------------------------------------------------------------
+
+
+def test_a_full_disk_leaves_the_older_file(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped(path)
+    older = path.read_bytes()
+
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(checkpoints.np, "savez", full)
+        with pytest.raises(Interrupted, match="no checkpoint was written") as caught:
+            sx.resume(path, time_limit=1e-9)
+    (warning,) = [
+        w for w in json.loads(caught.value.dataset.attrs["warnings"]) if "checkpoint" in w
+    ]
+    assert "No space left" in warning
+    assert path.read_bytes() == older
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+    runs.assert_same(simulate(), go_on(path)[0])
+
+
+def test_no_pickle(path: Path) -> None:
+    stopped(path, distribution=True)
+    with zipfile.ZipFile(path) as archive:
+        for name in archive.namelist():
+            content = archive.read(name)
+            assert content.startswith(b"\x93NUMPY")
+            assert b"'descr': '|O'" not in content[:200]
+    with np.load(path, allow_pickle=False) as file:
+        assert all(file[name].dtype.kind in "iuf" for name in file.files)
+    with pytest.raises(Exception):  # noqa: B017, PT011
+        list(pickletools.genops(path.read_bytes()))
+
+
+def test_a_pickle_is_not_run(tmp_path: Path) -> None:
+    path = tmp_path / "bad.npz"
+    np.savez(path, meta=np.array([{"version": 1}], object))
+    one_message(path, "bad.npz", "damaged")
