@@ -1,0 +1,127 @@
+"""Initial populations: every size class has its share, and the same seed gives the same."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import runs
+
+import smolux as sx
+from smolux.replicas import _population
+
+INITIALS = {
+    "monomers": sx.initial.monodisperse(density=2.0),
+    "one size": sx.initial.monodisperse(density=0.5, size=7),
+    "sizes": sx.initial.from_sizes({1: 0.1, 2: 0.25, 5: 0.15, 2000: 0.001}),
+    "unordered": sx.initial.from_sizes({9: 0.3, 4: 0.0, 2: 0.7}),
+    "exponential": sx.initial.exponential(4.0, density=3.0),
+    "exponential of monomers": sx.initial.exponential(1.0),
+    "lognormal": sx.initial.lognormal(6.0, 1.6, density=0.2),
+    "far": sx.initial.exponential(1e7),  # sampled particle by particle
+    "huge": sx.initial.from_sizes({10**12: 0.4, 3 * 10**15: 0.6}),
+}
+every_initial = pytest.mark.parametrize("initial", INITIALS.values(), ids=INITIALS.keys())
+PARTICLES = 1001
+
+
+def populations(initial: Any, replicas: int, seed: int = 3) -> list[tuple[Any, Any]]:
+    model = runs.model(initial=initial, c1=0.0)
+    plan = runs.plan(model, [1.0], runs.METHODS[0], particles=PARTICLES, seed=seed)
+    return [_population(plan, r) for r in range(replicas)]
+
+
+@every_initial
+def test_a_population_is_well_formed(initial: Any) -> None:
+    for sizes, counts in populations(initial, 20):
+        assert counts.sum() == PARTICLES
+        assert (counts > 0).all()
+        assert (np.diff(sizes) > 0).all()
+        assert sizes[0] >= 1
+        assert sizes[-1] <= initial.largest
+        assert sizes.dtype == counts.dtype == np.int64
+
+
+@every_initial
+def test_every_size_is_met_to_within_one_particle(initial: Any) -> None:
+    for sizes, counts in populations(initial, 20):
+        # sizes up to each one: systematic sampling errs by less than a particle
+        expected = PARTICLES * initial.cumulative(sizes.astype(float))
+        assert (np.abs(np.cumsum(counts) - expected) < 1 + 1e-9).all()
+
+
+@every_initial
+def test_mean_counts_are_the_densities(initial: Any) -> None:
+    replicas, top = 2000, 60
+    found = np.zeros((replicas, top + 1))
+    for r, (sizes, counts) in enumerate(populations(initial, replicas)):
+        small = sizes <= top
+        found[r, sizes[small]] = counts[small]
+    expected = PARTICLES * initial.densities(top) / initial.total
+    error = found[:, 1:].std(axis=0) / np.sqrt(replicas)
+    # a count is one of two neighbours: with the spread that this gives, if none was seen
+    rest = expected % 1
+    error = np.maximum(error, np.sqrt(rest * (1 - rest) / replicas) + 1e-6)
+    assert (np.abs(found[:, 1:].mean(axis=0) - expected) < 4.5 * error).all()
+
+
+@every_initial
+def test_mean_mass(initial: Any) -> None:
+    mass = [float((s * c.astype(float)).sum()) for s, c in populations(initial, 400)]
+    if hasattr(initial, "sizes"):
+        expected = np.dot(initial.sizes, initial.densities_) / initial.total
+    elif hasattr(initial, "mean"):
+        expected = initial.mean
+    else:
+        top = int(initial.largest)
+        expected = np.arange(1, top + 1) @ initial.densities(top) / initial.total
+    error = np.std(mass) / np.sqrt(len(mass)) + 1e-9 * np.mean(mass)
+    assert abs(np.mean(mass) - PARTICLES * expected) < 4.5 * error
+
+
+def test_exponential_densities_are_geometric() -> None:
+    n = INITIALS["exponential"].densities(400)
+    k = np.arange(1, 401)
+    assert n.sum() == pytest.approx(3.0)
+    assert (k * n).sum() == pytest.approx(12.0)
+    np.testing.assert_allclose(n[1:] / n[:-1], 0.75)
+
+
+def test_lognormal_median_and_width() -> None:
+    law = sx.initial.lognormal(1000.0, 1.5)
+    n = law.densities(law.largest)
+    assert n.sum() == pytest.approx(1.0)
+    k = np.log(np.arange(1, law.largest + 1))
+    assert np.exp((k * n).sum()) == pytest.approx(1000.0, rel=1e-4)
+    width = np.sqrt((k**2 * n).sum() - (k * n).sum() ** 2)
+    assert np.exp(width) == pytest.approx(1.5, rel=1e-4)
+
+
+@every_initial
+def test_the_seed_decides(initial: Any) -> None:
+    first, again = populations(initial, 4), populations(initial, 8)
+    for (a, b), (c, d) in zip(first, again, strict=False):
+        np.testing.assert_array_equal(a, c)
+        np.testing.assert_array_equal(b, d)
+    if initial.largest > 1 and len(getattr(initial, "sizes", (1, 2))) > 1:
+        other = populations(initial, 8, seed=4)
+        assert any(
+            not (np.array_equal(a, c) and np.array_equal(b, d))
+            for (a, b), (c, d) in zip(again, other, strict=True)
+        )
+
+
+@pytest.mark.parametrize("method", runs.METHODS)
+def test_at_time_zero(method: str) -> None:
+    initial = sx.initial.from_sizes({1: 0.8, 3: 0.2})
+    ds = sx.simulate(
+        runs.model(initial=initial), [0.0, 0.1], method=method, particles=1000, replicas=2, seed=5,
+        sizes=8,
+    )  # fmt: skip
+    start = ds.isel(time=0)
+    np.testing.assert_allclose(start["n"].values, [[0.8, 0, 0.2, 0, 0, 0, 0, 0]] * 2)
+    np.testing.assert_allclose(start["number_density"], 1.0)
+    np.testing.assert_allclose(start["volume"], 1000.0)
+    np.testing.assert_allclose(ds["moment"].sel(order=1), 1.4, rtol=1e-12)
+    assert (start["largest"] == 3).all()
