@@ -67,6 +67,31 @@ def simulate(
     return sx.simulate(physics, times, particles=particles, replicas=replicas, **settings)
 
 
+def second_moments(
+    physics: sx.Model,
+    times: np.ndarray,
+    particles: int,
+    method: str,
+    runs: tuple[int, int],
+    until: float,
+) -> dict[str, Any]:
+    """M2 of some runs to the end, and of these and some more to `until`.
+
+    Single runs show whether oscillations last; means can be compared only as long as the runs are
+    in phase, and there more of them are worth their time.
+    """
+    options: dict[str, Any] = {"method": method, "orders": (2,), "sizes": 1}
+    first = simulate(physics, times, particles, runs[0], **options)
+    long = first["moment"].values.reshape(runs[0], -1)
+    early = times[times <= until]
+    found = [long[:, : len(early)]]
+    if runs[1]:
+        more = simulate(physics, early, particles, runs[1], **options | {"seed": SEED + 1})
+        found.append(more["moment"].values.reshape(runs[1], -1))
+    collisions = float(first["collisions"].values[:, -1].mean()) / particles
+    return {"long": long, "early": np.concatenate(found), "collisions": collisions}
+
+
 def loop_seconds(physics: sx.Model, time_end: float, particles: int, method: str) -> float:
     """Processor seconds of the event loop of one run, compilation and set-up left out."""
     from smolux.plan import make_plan
