@@ -1,0 +1,269 @@
+"""The size-class method: pairs of classes from a frozen table, particles within them at random."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..core.loop import Pieces
+from ..core.slots import slot_edges
+from ..core.state import CLOCKS, LARGEST, PARTICLES, TIME, State
+from ..errors import InputError
+from . import size_class_pieces as pieces
+from .base import Int, Method, Rates, enlarged, spread
+from .size_class_pieces import AHEAD, BITS, CHUNK, FREE, META, NEXT, STALE, WIDEST, Work
+
+#: octaves of sizes by which arrays and bounds are extended
+_OCTAVES = 4
+_NARROW = (1 << 31) - 1
+
+
+@dataclass(frozen=True)
+class SizeClass(Method):
+    """Draw a pair of classes of sizes, then a particle of each; accept by the rate over its bound.
+
+    Sizes fall into classes: the small ones by themselves, then `classes` an octave. Bounds of the
+    kernel over a pair of classes are close, so nearly every candidate is accepted, whatever the
+    kernel: it need be neither of low rank nor monotonic. The law of the candidates is frozen for a
+    block of events, as if every class had a few more places than particles, so that they come from
+    an alias table; those that find a place empty, or a particle twice, are dropped. This is
+    uniformisation: the jump process is exact. The cost of an event depends neither on the kernel
+    nor, but for the caches, on the number of particles.
+
+    Parameters
+    ----------
+    classes : {0, 1, 2, 4, 8, 16}
+        Classes an octave; 0: by the number of particles.
+
+    References
+    ----------
+    A. Jensen, Skand. Aktuarietidskr. 36, 87 (1953), doi:10.1080/03461238.1953.10419459
+    (uniformisation); A. Patterson, M. Kraft et al., J. Comput. Phys. 211, 638 (2006),
+    doi:10.1016/j.jcp.2005.06.008 (majorants and binary search).
+    """
+
+    classes: int = 0
+
+    name: ClassVar[str] = "size-class"
+    title: ClassVar[str] = "size-class"
+    reference: ClassVar[str] = "uniformisation, A. Jensen, Skand. Aktuarietidskr. 36, 87 (1953)"
+
+    work_type: ClassVar[type] = Work
+
+    @staticmethod
+    def bind(rate: Any) -> Pieces:
+        """See `Method.bind`."""
+        return pieces.bind(rate)
+
+    def __post_init__(self) -> None:
+        if self.classes not in (0, 1, 2, 4, 8, 16):
+            raise InputError(f"classes = {self.classes!r}: must be 1, 2, 4, 8, 16, or 0 (chosen)")
+
+    def _bits(self, particles: int) -> int:
+        if self.classes:
+            return self.classes.bit_length() - 1
+        return 1 if particles < 3000 else 2
+
+    def new_work(
+        self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int
+    ) -> Work:
+        """See `Method.new_work`."""
+        replicas = len(populations)
+        total = np.array([counts.sum() for _, counts in populations])
+        bits = self._bits(int(total.max()))
+        chunk = int(np.clip(int(total.max()).bit_length() - 12, 4, 12))
+        largest = max(int(sizes[-1]) for sizes, _ in populations)
+        top = min(max(mass, largest, 16).bit_length(), 61)
+        classes = _class_of(1 << top, bits) + 1
+        work = _empty(replicas, classes, bits, chunk, int(total.max()), largest > _NARROW)
+        state.count[:, PARTICLES] = total
+        state.count[:, LARGEST] = [sizes[-1] for sizes, _ in populations]
+        edges = slot_edges(bits)
+        for r, (sizes, counts) in enumerate(populations):
+            _fill(work, r, sizes, counts, edges)
+        return work
+
+    def grow(self, work: Work, state: State) -> Work:
+        """See `Method.grow`; what has no room is found out from the sizes that are to be stored."""
+        size = int(state.sizes.max())
+        classes = work.number.shape[1]
+        bits = int(work.meta[0, BITS])
+        if _class_of(size, bits) >= classes:
+            return _more_classes(work, classes + (_OCTAVES << bits))
+        if size > work.meta[0, WIDEST]:
+            work.meta[:, WIDEST] = np.iinfo(np.int64).max
+            return work._replace(pool=work.pool.astype(np.int64))
+        return _more_chunks(work)
+
+    def supply_bound(self, work: Work, rates: Rates, state: State, replica: int) -> None:
+        """See `Method.supply_bound`; bounds come in fixed blocks of octaves.
+
+        A bound must not depend on which replica asked first.
+        """
+        bits = int(work.meta[0, BITS])
+        edges = slot_edges(bits)
+        number = work.number[replica]
+        largest = int(np.flatnonzero(number | work.flow[replica])[-1])
+        unknown = np.flatnonzero(np.isnan(np.diagonal(work.low)[1:]))
+        known = int(unknown[0]) + 1 if len(unknown) else len(work.low)
+        block = _OCTAVES << bits
+        end = min(-(-(largest + 1) // block) * block, work.high.shape[0])
+        g, h = np.triu_indices(end)
+        new = (h >= known) & (g >= 1)
+        g, h = g[new], h[new]
+        high, low = _bounds(rates, edges, g, h, 2 << bits)
+        work.high[g, h] = work.high[h, g] = high
+        work.low[g, h] = work.low[h, g] = low
+        if np.isnan(work.high[1 : largest + 1, 1 : largest + 1]).any():
+            smallest = int(edges[np.flatnonzero(number)[0]])
+            raise InputError(
+                f"the kernel has no finite bound for the sizes {smallest} to "
+                f"{edges[largest + 1] - 1}, which were reached at "
+                f"t = {state.clock[replica, TIME]:.6g}; limit what grows, as in "
+                "exp(min(x, 700)), or end earlier"
+            )
+
+    def population(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
+        """See `Method.population`."""
+        number, single = work.number[replica], 2 << int(work.meta[0, BITS])
+        small = np.flatnonzero(number[:single])
+        lists = [_members(work, replica, g) for g in range(single, len(number)) if number[g]]
+        large, counts = np.unique(
+            np.concatenate(lists) if lists else np.zeros(0, np.int64), return_counts=True
+        )
+        return (
+            np.concatenate((small, large)).astype(np.int64),
+            np.concatenate((number[small], counts)).astype(np.int64),
+        )
+
+    def bytes_per_replica(self, particles: int) -> int:
+        """See `Method.bytes_per_replica`."""
+        return 4 * particles + 40_000
+
+
+def _class_of(size: int, bits: int) -> int:
+    return int(np.searchsorted(slot_edges(bits), size, side="right")) - 1
+
+
+def _empty(
+    replicas: int, classes: int, bits: int, chunk: int, particles: int, wide: bool
+) -> Work:
+    """Make arrays for this many classes and particles, without any."""
+    # a class may hold all particles; every list may end in a chunk that is not full
+    stride = (particles >> chunk) + 2
+    chunks = stride + classes
+    meta = np.zeros((replicas, META), np.int64)
+    meta[:, BITS], meta[:, CHUNK], meta[:, FREE], meta[:, NEXT] = bits, chunk, chunks, AHEAD
+    meta[:, STALE] = 1
+    meta[:, WIDEST] = np.iinfo(np.int64).max if wide else _NARROW
+    pairs = classes * (classes + 1) // 2
+    free = np.tile(np.arange(chunks, dtype=np.int32)[::-1], (replicas, 1))
+
+    def zeros(columns: int, kind: Any) -> Any:
+        return np.zeros((replicas, columns), kind)
+
+    return Work(
+        meta,
+        *(zeros(classes, np.int64) for _ in range(4)),
+        np.zeros((replicas, classes, stride), np.int32),
+        free,
+        zeros(chunks << chunk, np.int64 if wide else np.int32),
+        zeros(pairs, float),
+        zeros(pairs, float),
+        zeros(pairs, np.int32),
+        zeros(pairs, np.int16),
+        zeros(pairs, np.int16),
+        zeros(pairs, np.int32),
+        *(zeros(AHEAD, np.int64) for _ in range(3)),
+        *(np.full((classes, classes), np.nan) for _ in range(2)),
+    )
+
+
+def _fill(work: Work, r: int, sizes: Int, counts: Int, edges: Int) -> None:
+    """Store an initial population."""
+    bits, chunk = int(work.meta[r, BITS]), int(work.meta[r, CHUNK])
+    single = sizes < 2 << bits
+    work.number[r, sizes[single]] = counts[single]
+    sizes, counts = sizes[~single], counts[~single]
+    of = np.searchsorted(edges, sizes, side="right") - 1
+    for g in np.unique(of):
+        n = int(counts[of == g].sum())
+        used = -(-n >> chunk)
+        left = int(work.meta[r, FREE]) - used
+        taken = work.free[r, left : left + used][::-1]
+        work.meta[r, FREE] = left
+        work.where[r, g, :used] = taken
+        work.number[r, g] = n
+        held = np.empty(n, work.pool.dtype)
+        spread(sizes[of == g], counts[of == g], held)
+        for k, c in enumerate(taken):
+            part = held[k << chunk : (k + 1) << chunk]
+            work.pool[r, int(c) << chunk : (int(c) << chunk) + len(part)] = part
+
+
+def _members(work: Work, r: int, g: int) -> Int:
+    """Sizes of the particles of a list."""
+    chunk = int(work.meta[r, CHUNK])
+    n = int(work.number[r, g])
+    places = work.where[r, g, : -(-n >> chunk)].astype(np.int64) << chunk
+    held = work.pool[r, (places[:, None] + np.arange(1 << chunk)).ravel()[:n]]
+    return held.astype(np.int64)
+
+
+def _more_classes(work: Work, classes: int) -> Work:
+    pairs = classes * (classes + 1) // 2
+    old = work.high.shape[0]
+    high, low = (np.full((classes, classes), np.nan) for _ in range(2))
+    high[:old, :old], low[:old, :old] = work.high, work.low
+    where = np.zeros((len(work.meta), classes, work.where.shape[2]), np.int32)
+    where[:, :old] = work.where
+    by_class = {f: enlarged(getattr(work, f), classes) for f in ("number", "room", "flow", "before")}
+    by_pair = {
+        f: enlarged(getattr(work, f), pairs)
+        for f in ("weight", "share", "alias", "first", "second", "queue")
+    }
+    return work._replace(high=high, low=low, where=where, **by_class, **by_pair)
+
+
+def _more_chunks(work: Work) -> Work:
+    """Double the pool, and the most that a list may hold."""
+    chunk = int(work.meta[0, CHUNK])
+    old = work.free.shape[1]
+    free = enlarged(work.free, 2 * old)
+    for r in range(len(free)):  # the new chunks are used last: their memory may never be touched
+        left = int(work.meta[r, FREE])
+        free[r, old : old + left] = work.free[r, :left]
+        free[r, :old] = np.arange(2 * old - 1, old - 1, -1)
+    work.meta[:, FREE] += old
+    return work._replace(
+        free=free,
+        where=enlarged(work.where, 2 * work.where.shape[2]),
+        pool=enlarged(work.pool, 2 * old << chunk),
+    )
+
+
+def _bounds(rates: Rates, edges: Int, g: Int, h: Int, single: int) -> tuple[Any, Any]:
+    """Upper bounds for pairs of classes, and what a rate is at least as a share of them."""
+    a, b = edges[g].astype(float), (edges[g + 1] - 1).astype(float)
+    c, d = edges[h].astype(float), (edges[h + 1] - 1).astype(float)
+    high, least = np.empty(len(g)), np.empty(len(g))
+    whole = h < single  # one size each: the rate itself
+    high[whole] = least[whole] = rates.arrays(a[whole], c[whole])
+    wide = ~whole
+    least[wide], high[wide] = rates.bounds(a[wide], b[wide], c[wide], d[wide])
+    if not rates.rigorous:
+        least[wide] = 0.0
+        # zeros alone prove nothing: candidates go on coming, at the rate of all sizes so far
+        top = np.max(high[np.isfinite(high)], initial=0.0)
+        high[wide & (high <= 0.0)] = top
+    # where there is no valid rate, candidates must come and find that out
+    invalid = whole & ~((high >= 0.0) & (high < np.inf))
+    high[invalid], least[invalid] = 1.0, 0.0
+    high = np.maximum(high, 0.0)
+    with np.errstate(all="ignore"):
+        low = np.where(high > 0.0, np.maximum(least, 0.0) / high, 0.0)
+    low = np.where(np.isfinite(low), np.minimum(low, 1.0), 0.0)
+    high[~np.isfinite(high)] = np.nan
+    return high, low
