@@ -80,11 +80,14 @@ _loops: dict[tuple[Any, ...], Any] = {}
 
 
 def loop_for(model: Model, method: Method, weighting: Weighting) -> Any:
-    """Return the compiled loop, the same object for the same physics and method."""
+    """Return the compiled loop, the same object for the same physics and method.
+
+    The settings of a method are data of its work arrays; those of a weighting are compiled in.
+    """
     rate = model.kernel.rate
     outcomes = [type(process).outcome for process in model.processes]
     factors = [process.factor.rate for process in model.processes]
-    key = (type(method), type(weighting), *map(digest, (rate, *outcomes, *factors)))
+    key = (type(method), weighting, *map(digest, (rate, *outcomes, *factors)))
     if key not in _loops:
         simulated = weighting.compiled(_as_float(rate))
         _loops[key] = make_loop(method.bind(simulated), _outcomes(outcomes), _factors(factors))
