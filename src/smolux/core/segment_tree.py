@@ -1,8 +1,8 @@
 """Segment trees: sums of weights over slots, in which a slot is found by its place in the total.
 
-A tree has one row for each kind of weight. A node is the sum of its sixteen children, always added
-up in the same way and never corrected by differences: rounding does not pile up, and neither the
-history nor empty slots at the end change a sum.
+Weights are whole numbers, so sums are exact: differences are added along the path to the root,
+nothing drifts, and the sums depend neither on the order of events nor on empty slots at the end. A
+tree has one row for each kind of weight; a node is the sum of its four children.
 
 References
 ----------
@@ -16,11 +16,8 @@ import numpy as np
 
 from .compile import cold_piece, piece
 
-#: children of a node
-FANOUT = 16
-
-#: the sum of the children may be reordered, so that it vectorises
-_FAST = {"fastmath": {"reassoc", "contract", "nsz"}}
+#: children of a node; with more, an event adds to fewer sums, and looks at more of them
+FANOUT = 4
 
 
 def levels_of(slots: int) -> np.ndarray:
@@ -37,72 +34,58 @@ def levels_of(slots: int) -> np.ndarray:
     return np.array(starts, np.int64)
 
 
-@piece(**_FAST)
-def _add_up(tree, row, first):
-    total = 0.0
-    for k in range(FANOUT):
-        total += tree[row, first + k]
-    return total
-
-
 @piece
-def _renew(tree, levels, rows, level, node):
-    """Compute one node of every row from its children; `level` is that of the children."""
-    for row in range(rows):
-        tree[row, levels[level + 1] + node] = _add_up(tree, row, levels[level] + node * FANOUT)
-
-
-@piece
-def refresh(tree, levels, rows, a, b, c):
-    """Bring the first `rows` rows up to date after a change of three slots, equal or not."""
+def add(tree, levels, row, slots, weights):
+    """Add to the weights of three slots, equal or not, in one row."""
+    a, b, c = slots
+    x, y, z = weights
     for level in range(levels.shape[0] - 1):
+        # unsigned: an index that may be negative costs a comparison
+        first = levels[level]
+        tree[row, np.uintp(first + a)] += x
+        tree[row, np.uintp(first + b)] += y
+        tree[row, np.uintp(first + c)] += z
         a //= FANOUT
         b //= FANOUT
         c //= FANOUT
-        _renew(tree, levels, rows, level, c)
-        if a != c:
-            _renew(tree, levels, rows, level, a)
-        if b != c and b != a:
-            _renew(tree, levels, rows, level, b)
+    tree[row, tree.shape[1] - 1] += x + y + z
 
 
 @cold_piece
-def build(tree, levels, rows):
-    """Compute all nodes from the slots."""
+def build(tree, levels, row):
+    """Compute the nodes of one row from the slots."""
+    tree[row, levels[1] :] = 0
     for level in range(levels.shape[0] - 1):
-        end = levels[level + 2] if level + 2 < levels.shape[0] else tree.shape[1]
-        children = levels[level + 1] - levels[level]
-        for node in range(end - levels[level + 1]):
-            if node * FANOUT < children:
-                _renew(tree, levels, rows, level, node)
+        for k in range(levels[level + 1] - levels[level]):
+            tree[row, levels[level + 1] + k // FANOUT] += tree[row, levels[level] + k]
 
 
 @piece
 def find(tree, levels, row, x):
-    """Find where the cumulative sum of the slots passes `x`; the slot, and what is left of `x`.
+    """Find where the cumulative sum of a row passes `x`, ``0 <= x < root``.
 
-    Rounding may leave `x` beyond all children of a node: then it is the last that is not empty.
+    Returns the slot, and by how much `x` is above the sum of those before it. No branch depends on
+    the weights: which child it is, no processor can predict.
     """
     slot = np.int64(0)
     for level in range(levels.shape[0] - 2, -1, -1):
         first = levels[level] + slot * FANOUT
-        chosen = np.int64(-1)
-        for k in range(FANOUT):
-            weight = tree[row, first + k]
-            if weight > 0.0:
-                chosen = np.int64(k)
-                if x < weight:
-                    break
-                x -= weight
-        else:
-            x = tree[row, first + chosen]
-        slot = slot * FANOUT + chosen
+        one = tree[row, np.uintp(first)]
+        two = one + tree[row, np.uintp(first + 1)]
+        three = two + tree[row, np.uintp(first + 2)]
+        before = one if x >= one else np.int64(0)
+        before = two if x >= two else before
+        before = three if x >= three else before
+        slot = slot * FANOUT + (x >= one) + (x >= two) + (x >= three)
+        x -= before
     return slot, x
 
 
 @cold_piece
 def find_mixed(tree, levels, rows, coefficients, x):
     """`find` in the sum of the rows times coefficients of any sign, in which no slot is negative.
+
+    Rounding may leave `x` beyond all children of a node: then it is the last that is not empty.
 
     References
     ----------
@@ -111,19 +94,16 @@ def find_mixed(tree, levels, rows, coefficients, x):
     slot = np.int64(0)
     for level in range(levels.shape[0] - 2, -1, -1):
         first = levels[level] + slot * FANOUT
-        chosen, largest = np.int64(0), 0.0
-        rest = x
+        child, rest = np.int64(0), 0.0
         for k in range(FANOUT):
             weight = 0.0
             for row in range(rows):
                 weight += coefficients[row] * tree[row, first + k]
             if weight > 0.0:
-                chosen, largest = np.int64(k), weight
-                if rest < weight:
+                child, rest = np.int64(k), min(x, weight)
+                if x < weight:
                     break
-                rest -= weight
-        else:
-            rest = largest
+                x -= weight
         x = rest
-        slot = slot * FANOUT + chosen
+        slot = slot * FANOUT + child
     return slot, x

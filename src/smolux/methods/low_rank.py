@@ -130,7 +130,7 @@ class LowRank(Method):
         factors = tables.factor.shape[2]
         return Work(
             number,
-            np.zeros((replicas, factors, levels[-1] + 1)),
+            np.zeros((replicas, factors, levels[-1] + 1), np.int64),
             levels,
             start,
             room,
@@ -139,6 +139,10 @@ class LowRank(Method):
             np.zeros((replicas, 4), np.int64),
             meta,
             np.zeros((replicas, factors)),
+            np.zeros((replicas, slots, factors)),
+            np.zeros((replicas, slots)),
+            np.zeros((replicas, tables.weights.shape[1])),
+            np.zeros((replicas, factors), np.int64),
             *tables,
             bound,
             np.array([bits]),
@@ -164,7 +168,9 @@ class LowRank(Method):
         meta[:, STAGE] = -1
         return work._replace(
             number=enlarged(work.number, slots),
-            tree=np.zeros((*work.tree.shape[:2], levels[-1] + 1)),
+            tree=np.zeros((*work.tree.shape[:2], levels[-1] + 1), np.int64),
+            grains=np.zeros((len(meta), slots, work.grains.shape[2])),
+            share=np.zeros((len(meta), slots)),
             levels=levels,
             start=start,
             room=enlarged(work.room, slots),

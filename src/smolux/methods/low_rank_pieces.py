@@ -11,7 +11,7 @@ from ..core import rng
 from ..core.compile import cold_piece, piece
 from ..core.loop import note_bad, repair
 from ..core.prefetch import prefetch
-from ..core.segment_tree import build, find, find_mixed, refresh
+from ..core.segment_tree import add, build, find, find_mixed
 from ..core.slots import octave
 from ..core.state import BOUND, FIRST, FLOOR, LARGEST, PARTICLES, SINCE, TRIALS, VALUE, VOLUME
 from .low_rank_store import (
@@ -35,15 +35,22 @@ _PATIENCE = 4096
 _ROUNDING = 1.0 + 1e-12
 
 
+#: sums are kept below this number of quanta, so that a uniform number can tell them all apart
+_MOST = 1 << 52
+#: what the quanta are chosen for
+_AIM = 2.0**44
+
+
 @piece
 def _root(w, row):
-    return w.tree[row, w.levels[w.levels.shape[0] - 1]]
+    return w.tree[row, w.tree.shape[1] - 1]
 
 
 @piece
 def _term_total(w, stage, k):
     """Sum of one term of the majorant over all ordered pairs."""
-    return w.weight[stage, k] * _root(w, w.term[stage, k, 0]) * _root(w, w.term[stage, k, 1])
+    left, right = w.term[stage, k, 0], w.term[stage, k, 1]
+    return w.weight[k] * (float(_root(w, left)) * float(_root(w, right)))
 
 
 @piece
@@ -52,9 +59,8 @@ def _majorant(w, stage, a, b):
     total = 0.0
     for k in range(w.rank[stage, 1]):
         left, right = w.term[stage, k, 0], w.term[stage, k, 1]
-        total += w.weight[stage, k] * (
-            w.factor[stage, a, left] * w.factor[stage, b, right]
-            + w.factor[stage, b, left] * w.factor[stage, a, right]
+        total += w.weight[k] * (
+            w.grains[a, left] * w.grains[b, right] + w.grains[b, left] * w.grains[a, right]
         )
     return total
 
@@ -69,10 +75,11 @@ def _place(w, slot, x, weight):
 
 
 @piece
-def _choose(w, stage, row, x):
-    """Slot and place of a particle, by one factor."""
-    slot, rest = find(w.tree, w.levels, row, x)
-    return slot, _place(w, slot, rest, w.factor[stage, slot, row])
+def _choose(w, row, x):
+    """Slot and place of a particle, by one factor; `x` is uniform in [0, 1)."""
+    root = _root(w, row)
+    slot, rest = find(w.tree, w.levels, row, min(np.int64(x * root), root - 1))
+    return slot, _place(w, slot, float(rest), w.grains[slot, row])
 
 
 @cold_piece
@@ -81,34 +88,38 @@ def _choose_mixed(w, stage, x):
     slot, rest = find_mixed(w.tree, w.levels, w.rank[stage, 0], w.mix, x)
     weight = 0.0
     for row in range(w.rank[stage, 0]):
-        weight += w.mix[row] * w.factor[stage, slot, row]
+        weight += w.mix[row] * w.grains[slot, row]
     return slot, _place(w, slot, rest, weight)
 
 
 @cold_piece
 def _pair_mixed(s, w, stage, total):
     """Choose a pair by all terms together, which may be of mixed sign: Osinsky, eq. (26)."""
-    terms = w.rank[stage, 1]
     w.mix[:] = 0.0
-    for k in range(terms):
-        right = _root(w, w.term[stage, k, 1])
-        w.mix[w.term[stage, k, 0]] += w.weight[stage, k] * right
+    for k in range(w.rank[stage, 1]):
+        left, right = w.term[stage, k, 0], w.term[stage, k, 1]
+        w.mix[left] += w.weight[k] * _root(w, right)
     a, place = _choose_mixed(w, stage, rng.uniform(s.rng) * total)
     w.chosen[0], w.chosen[1] = a, place
     w.mix[:] = 0.0
-    sum_b = 0.0
-    for k in range(terms):
-        right, share = w.term[stage, k, 1], w.factor[stage, a, w.term[stage, k, 0]]
-        w.mix[right] += w.weight[stage, k] * share
-        sum_b += w.weight[stage, k] * share * _root(w, right)
-    w.chosen[2], w.chosen[3] = _choose_mixed(w, stage, rng.uniform(s.rng) * sum_b)
+    others = 0.0
+    for k in range(w.rank[stage, 1]):
+        left, right = w.term[stage, k, 0], w.term[stage, k, 1]
+        w.mix[right] += w.weight[k] * w.grains[a, left]
+        others += w.weight[k] * w.grains[a, left] * _root(w, right)
+    w.chosen[2], w.chosen[3] = _choose_mixed(w, stage, rng.uniform(s.rng) * others)
 
 
 @piece
 def _pair_by_term(s, w, stage, total):
     """Choose a term by its weight, then both particles by its two factors."""
-    x = rng.uniform(s.rng) * total
-    k, weight = 0, 0.0
+    x = rng.uniform(s.rng)
+    if w.rank[stage, 1] == 1:
+        w.chosen[0], w.chosen[1] = _choose(w, w.term[stage, 0, 0], x)
+        w.chosen[2], w.chosen[3] = _choose(w, w.term[stage, 0, 1], rng.uniform(s.rng))
+        return
+    x *= total
+    k, weight = 0, 1.0
     for m in range(w.rank[stage, 1]):
         own = _term_total(w, stage, m)
         if own > 0.0:
@@ -116,12 +127,9 @@ def _pair_by_term(s, w, stage, total):
             if x < own:
                 break
             x -= own
-    left, right = w.term[stage, k, 0], w.term[stage, k, 1]
     # what is left of x is uniform below the weight of the term, and serves again
-    x = min(x / weight, 1.0 - 1e-16) * _root(w, left)
-    w.chosen[0], w.chosen[1] = _choose(w, stage, left, x)
-    x = rng.uniform(s.rng) * _root(w, right)
-    w.chosen[2], w.chosen[3] = _choose(w, stage, right, x)
+    w.chosen[0], w.chosen[1] = _choose(w, w.term[stage, k, 0], x / weight)
+    w.chosen[2], w.chosen[3] = _choose(w, w.term[stage, k, 1], rng.uniform(s.rng))
 
 
 @piece
@@ -138,7 +146,7 @@ def make_draw(rate: Any) -> Any:
         """Whether the chosen pair collides: 1 or 0; -1 if its rate is none."""
         x = rng.uniform(s.rng)
         a, b = w.chosen[0], w.chosen[2]
-        if x * raised < w.share[stage, a] * w.share[stage, b]:
+        if x * raised < w.share[a] * w.share[b]:
             return 1
         i, j = pair(s, w)
         value = rate(float(i), float(j), *p)
@@ -185,9 +193,17 @@ def make_draw(rate: Any) -> Any:
 
 
 @piece
-def _weigh(w, stage, slot):
+def _account(w, stage, a, b, c, count):
+    """Account in all trees for one particle less in two slots and `count` more in another."""
     for row in range(w.rank[stage, 0]):
-        w.tree[row, slot] = w.number[slot] * w.factor[stage, slot, row]
+        new = count * w.grains[c, row]
+        if new + _root(w, row) > _MOST:
+            w.meta[STAGE] = -1
+            return
+        less_a, less_b = -np.int64(w.grains[a, row]), -np.int64(w.grains[b, row])
+        add(w.tree, w.levels, row, (a, b, c), (less_a, less_b, np.int64(new)))
+        if _root(w, row) < w.least[row]:
+            w.meta[STAGE] = -1
 
 
 @piece
@@ -214,26 +230,47 @@ def update(s, w, entries, p):
         remove(s, w, b, w.chosen[3])
     s.count[PARTICLES] -= 2
     stage = w.meta[STAGE]
-    c = slot_for(w, s.sizes[0])
-    insert(s, w, c, s.sizes[0], s.counts[0])
-    _weigh(w, stage, a)
-    _weigh(w, stage, b)
-    _weigh(w, stage, c)
-    refresh(w.tree, w.levels, w.rank[stage, 0], a, b, c)
-    for e in range(1, entries):
+    for e in range(entries):
         c = slot_for(w, s.sizes[e])
         insert(s, w, c, s.sizes[e], s.counts[e])
-        _weigh(w, stage, c)
-        refresh(w.tree, w.levels, w.rank[stage, 0], c, c, c)
+        if e > 0:
+            a = b = np.int64(0)  # no particle is in slot 0, and none weighs anything there
+        if w.meta[STAGE] >= 0:
+            _account(w, stage, a, b, c, s.counts[e])
     return True
 
 
 @cold_piece
 def _build(w, stage):
+    """Choose quanta for which the sums are large whole numbers, and build the trees of them."""
     w.meta[STAGE] = stage
-    for slot in range(w.number.shape[0]):
-        _weigh(w, stage, slot)
-    build(w.tree, w.levels, w.rank[stage, 0])
+    factors, slots = w.rank[stage, 0], w.number.shape[0]
+    for slot in range(slots):
+        w.share[slot] = w.shares[stage, slot]
+    for k in range(w.rank[stage, 1]):
+        w.weight[k] = w.weights[stage, k]
+    for row in range(factors):
+        total = 0.0
+        for slot in range(1, slots):
+            if w.number[slot] > 0.0:
+                total += w.number[slot] * w.factor[stage, slot, row]
+        scale = math.ldexp(1.0, math.floor(math.log2(_AIM / total))) if total > 0.0 else 1.0
+        above = 1.0 if row < factors - w.rank[stage, 2] else 0.0
+        for slot in range(1, slots):
+            exact = w.factor[stage, slot, row] * scale
+            grains = np.floor(exact) + above
+            w.grains[slot, row] = grains
+            w.share[slot] = min(w.share[slot], w.shares[stage, slot] * (exact / grains))
+            if w.number[slot] > 0.0:
+                w.tree[row, slot] = np.int64(w.number[slot] * grains)
+            else:
+                w.tree[row, slot] = 0
+        build(w.tree, w.levels, row)
+        w.least[row] = _root(w, row) >> 8
+        for k in range(w.rank[stage, 1]):
+            for side in range(2):
+                if w.term[stage, k, side] == row:
+                    w.weight[k] /= scale
 
 
 @piece

@@ -27,14 +27,14 @@ METAS = 8
 
 
 class Work(NamedTuple):
-    """Particles and sums for C slots, F powers; tables for S stages.
+    """Particles and sums for C slots, F factors in K terms; tables for S stages.
 
     Attributes
     ----------
     number : float64 array of shape (R, C)
         Particles in each slot (whole numbers).
-    tree : float64 array of shape (R, F, T)
-        Segment trees over ``number * factor``, see `smolux.core.segment_tree`.
+    tree : int64 array of shape (R, F, T)
+        Segment trees over ``number * grains``, see `smolux.core.segment_tree`.
     levels : int64 array
         Where their levels begin.
     start, room, order : int64 arrays of shape (R, C)
@@ -46,15 +46,25 @@ class Work(NamedTuple):
     meta : int64 array of shape (R, 8)
     mix : float64 array of shape (R, F)
         Scratch for majorants of mixed sign.
+    grains : float64 array of shape (R, C, F)
+        Weight of one particle of a slot, a whole number of quanta: the factor, rounded up.
+    share : float64 array of shape (R, C)
+        ``K >= share_a share_b`` times the majorant in the slots a and b.
+    weight : float64 array of shape (R, K)
+        Weight of each term, in quanta of its factors.
+    least : int64 array of shape (R, F)
+        Sums for which the quanta are too coarse.
     factor : float64 array of shape (S, slots, F)
         Bounds of the factors over each slot.
-    share : float64 array of shape (S, slots)
-        ``K >= share_a share_b`` times the majorant in the slots a and b.
-    weight : float64 array of shape (S, terms)
-    term : int64 array of shape (S, terms, 2)
+    shares : float64 array of shape (S, slots)
+        As `share`, for the factors themselves.
+    weights : float64 array of shape (S, K)
+        As `weight`, for the factors themselves.
+    term : int64 array of shape (S, K, 2)
         Left and right factor of each term.
     rank : int64 array of shape (S, 3)
-        Factors and terms in use; 1 for mixed signs. Zeros where nothing is known yet.
+        Factors and terms in use; how many factors, the last ones, are bounds from below, for terms
+        of negative weight. Zeros where nothing is known yet.
     bound : float64 array of shape (slots, slots), or empty
         Bounds of the kernel for pairs of slots, if the majorant is made of them; NaN until needed.
     bits : int64 array of shape (1,)
@@ -71,9 +81,13 @@ class Work(NamedTuple):
     chosen: np.ndarray
     meta: np.ndarray
     mix: np.ndarray
-    factor: np.ndarray
+    grains: np.ndarray
     share: np.ndarray
     weight: np.ndarray
+    least: np.ndarray
+    factor: np.ndarray
+    shares: np.ndarray
+    weights: np.ndarray
     term: np.ndarray
     rank: np.ndarray
     bound: np.ndarray
@@ -94,9 +108,13 @@ def view(w, r):
         w.chosen[r],
         w.meta[r],
         w.mix[r],
+        w.grains[r],
+        w.share[r],
+        w.weight[r],
+        w.least[r],
         w.factor,
-        w.share,
-        w.weight,
+        w.shares,
+        w.weights,
         w.term,
         w.rank,
         w.bound,
@@ -212,7 +230,7 @@ def _respace(s, w, copies):
 
 @cold_piece
 def double(s, w):
-    """Put every particle in once more; twice a sum is exactly the sum of twice."""
+    """Put every particle in once more; the trees are then built afresh."""
     stored = s.count[STORED]
     if stored > 0:
         if 2 * stored > w.pool.shape[0]:
@@ -221,9 +239,7 @@ def double(s, w):
         _respace(s, w, 2)
     for slot in range(w.number.shape[0]):
         w.number[slot] *= 2.0
-    for row in range(w.tree.shape[0]):
-        for node in range(w.tree.shape[1]):
-            w.tree[row, node] *= 2.0
+    w.meta[STAGE] = -1
     s.count[STORED] *= 2
     s.count[PARTICLES] *= 2
     return True

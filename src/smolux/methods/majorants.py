@@ -25,8 +25,8 @@ class Tables(NamedTuple):
     """The majorant over slots for S stages; see `smolux.methods.low_rank_store.Work`."""
 
     factor: Float
-    share: Float
-    weight: Float
+    shares: Float
+    weights: Float
     term: Int
     rank: Int
 
@@ -60,7 +60,7 @@ class Found(NamedTuple):
         factors, slots = self.factor.shape
         terms = len(self.weight)
         tables.factor[stage, 1 : slots + 1, :factors] = self.factor.T * (1.0 + _ROUNDING)
-        tables.weight[stage, :terms] = self.weight
+        tables.weights[stage, :terms] = self.weight
         tables.term[stage, :terms] = self.term
         tables.rank[stage] = factors, terms, 0
 
@@ -71,29 +71,23 @@ def from_powers(majorant: Majorant, edges: Int) -> Tables:
     Each power is taken at the end of a slot where it is larger; in a term of negative weight, where
     it is smaller.
     """
-    powers = [(exponent, weight < 0) for weight, *pair in majorant.terms for exponent in pair]
-    rows = list(dict.fromkeys(powers))
+    powers = [(weight < 0, exponent) for weight, *pair in majorant.terms for exponent in pair]
+    rows = sorted(dict.fromkeys(powers))  # those that bound from below are the last
+    below = sum(lower for lower, _ in rows)
     low, high = edges[1:-1].astype(float), (edges[2:] - 1).astype(float)
-    ends = np.array([np.sort((low**e, high**e), axis=0) for e, _ in rows])
-    factor = np.array(
-        [
-            pair[0] * (1.0 - _ROUNDING) if below else pair[1] * (1.0 + _ROUNDING)
-            for pair, (_, below) in zip(ends, rows, strict=True)
-        ]
-    )
-    # one share for both: every power falls by at most this from its bound
-    share = (ends[:, 0] / factor).min(axis=0) * np.sqrt(majorant.least)
-    mixed = any(below for _, below in rows)
-    if mixed:
-        share[:] = 0.0
+    ends = np.sort([(low**e, high**e) for _, e in rows], axis=1)
+    least, most = ends[:, 0] * (1.0 - _ROUNDING), ends[:, 1] * (1.0 + _ROUNDING)
+    lower = np.array([lower for lower, _ in rows])
+    factor = np.where(lower[:, None], least, most)
+    # every factor falls by at most this share from its bound
+    share = np.sqrt(majorant.least) * (least / most).min(axis=0) * (below == 0)
     term = [[rows.index(p) for p in powers[2 * k : 2 * k + 2]] for k in range(len(majorant.terms))]
-    empty = np.zeros((1, 1))
     return Tables(
         np.concatenate((np.zeros((1, len(rows))), factor.T))[None].copy(),
-        np.concatenate((empty, share[None]), axis=1),
+        np.concatenate(([0.0], share))[None],
         np.array([[weight for weight, _, _ in majorant.terms]]),
         np.array([term], np.int64),
-        np.array([[len(rows), len(term), int(mixed)]], np.int64),
+        np.array([[len(rows), len(term), below]], np.int64),
     )
 
 
