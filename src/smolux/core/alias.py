@@ -53,4 +53,5 @@ def outcome(share, alias, n, x):
     """Outcome of a table of `n` columns for a uniform number."""
     x *= n
     k = np.int64(x)
-    return k if x - k < share[k] else np.int64(alias[k])
+    other = np.int64(alias[k])  # read in any case: a choice costs less than a branch
+    return k if x - k < share[k] else other

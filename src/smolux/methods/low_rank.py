@@ -74,8 +74,9 @@ class LowRank(Method):
     work_type: ClassVar[type] = Work
     #: whether the majorant is one product, with both factors the same
     single: ClassVar[bool] = False
-    #: a majorant that is found needs bounds for all pairs of slots, so these are fewer
-    _found_bits: ClassVar[int] = 3
+    #: a majorant that is found needs bounds for all pairs of slots, so these are fewer, and again if
+    #: bounds are sampled, which takes long
+    _found_bits: ClassVar[tuple[int, int]] = (2, 3)
 
     def __post_init__(self) -> None:
         if not (isinstance(self.bits, (int, np.integer)) and 0 <= self.bits <= 8):
@@ -94,7 +95,7 @@ class LowRank(Method):
             known = known if left == right and not more else None
         if known is not None:
             return from_powers(known, slot_edges(self.bits)), np.empty((0, 0)), self.bits
-        bits = min(self.bits, self._found_bits)
+        bits = min(self.bits, self._found_bits[rates.rigorous])
         slots = len(slot_edges(bits)) - 1
         return Tables.empty(_STAGES, slots), np.full((slots, slots), np.nan), bits
 

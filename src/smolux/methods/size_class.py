@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.loop import Pieces
 from ..core.slots import slot_edges
-from ..core.state import CLOCKS, LARGEST, PARTICLES, TIME, State
+from ..core.state import LARGEST, PARTICLES, TIME, State
 from ..errors import InputError
 from . import size_class_pieces as pieces
 from .base import Int, Method, Rates, enlarged, spread
@@ -64,7 +64,7 @@ class SizeClass(Method):
     def _bits(self, particles: int) -> int:
         if self.classes:
             return self.classes.bit_length() - 1
-        return 1 if particles < 3000 else 2
+        return 1 if particles < 30_000 else 2 if particles < 300_000 else 3
 
     def new_work(
         self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int
@@ -76,7 +76,8 @@ class SizeClass(Method):
         chunk = int(np.clip(int(total.max()).bit_length() - 12, 4, 12))
         largest = max(int(sizes[-1]) for sizes, _ in populations)
         top = min(max(mass, largest, 16).bit_length(), 61)
-        classes = _class_of(1 << top, bits) + 1
+        block = _OCTAVES << bits
+        classes = -(-(_class_of(1 << top, bits) + 1) // block) * block
         work = _empty(replicas, classes, bits, chunk, int(total.max()), largest > _NARROW)
         state.count[:, PARTICLES] = total
         state.count[:, LARGEST] = [sizes[-1] for sizes, _ in populations]
@@ -106,16 +107,15 @@ class SizeClass(Method):
         edges = slot_edges(bits)
         number = work.number[replica]
         largest = int(np.flatnonzero(number | work.flow[replica])[-1])
-        unknown = np.flatnonzero(np.isnan(np.diagonal(work.low)[1:]))
-        known = int(unknown[0]) + 1 if len(unknown) else len(work.low)
         block = _OCTAVES << bits
-        end = min(-(-(largest + 1) // block) * block, work.high.shape[0])
-        g, h = np.triu_indices(end)
-        new = (h >= known) & (g >= 1)
-        g, h = g[new], h[new]
-        high, low = _bounds(rates, edges, g, h, 2 << bits)
-        work.high[g, h] = work.high[h, g] = high
-        work.low[g, h] = work.low[h, g] = low
+        for start in range(0, largest + 1, block):
+            if np.isnan(work.low[start + 1, start + 1]):
+                g, h = np.triu_indices(min(start + block, len(edges) - 1))
+                new = (h >= start) & (g >= 1)
+                g, h = g[new], h[new]
+                high, low = _bounds(rates, edges, g, h, 2 << bits)
+                work.high[g, h] = work.high[h, g] = high
+                work.low[g, h] = work.low[h, g] = low
         if np.isnan(work.high[1 : largest + 1, 1 : largest + 1]).any():
             smallest = int(edges[np.flatnonzero(number)[0]])
             raise InputError(
@@ -147,16 +147,14 @@ def _class_of(size: int, bits: int) -> int:
     return int(np.searchsorted(slot_edges(bits), size, side="right")) - 1
 
 
-def _empty(
-    replicas: int, classes: int, bits: int, chunk: int, particles: int, wide: bool
-) -> Work:
+def _empty(replicas: int, classes: int, bits: int, chunk: int, particles: int, wide: bool) -> Work:
     """Make arrays for this many classes and particles, without any."""
     # a class may hold all particles; every list may end in a chunk that is not full
     stride = (particles >> chunk) + 2
     chunks = stride + classes
     meta = np.zeros((replicas, META), np.int64)
-    meta[:, BITS], meta[:, CHUNK], meta[:, FREE], meta[:, NEXT] = bits, chunk, chunks, AHEAD
-    meta[:, STALE] = 1
+    meta[:, (BITS, CHUNK, FREE)] = bits, chunk, chunks
+    meta[:, NEXT], meta[:, STALE] = AHEAD, 1
     meta[:, WIDEST] = np.iinfo(np.int64).max if wide else _NARROW
     pairs = classes * (classes + 1) // 2
     free = np.tile(np.arange(chunks, dtype=np.int32)[::-1], (replicas, 1))
@@ -173,10 +171,10 @@ def _empty(
         zeros(pairs, float),
         zeros(pairs, float),
         zeros(pairs, np.int32),
-        zeros(pairs, np.int16),
-        zeros(pairs, np.int16),
         zeros(pairs, np.int32),
-        *(zeros(AHEAD, np.int64) for _ in range(3)),
+        zeros(pairs, np.int32),
+        *(zeros(AHEAD, np.int64) for _ in range(2)),
+        np.arange(classes) >= 2 << bits,
         *(np.full((classes, classes), np.nan) for _ in range(2)),
     )
 
@@ -219,12 +217,15 @@ def _more_classes(work: Work, classes: int) -> Work:
     high[:old, :old], low[:old, :old] = work.high, work.low
     where = np.zeros((len(work.meta), classes, work.where.shape[2]), np.int32)
     where[:, :old] = work.where
-    by_class = {f: enlarged(getattr(work, f), classes) for f in ("number", "room", "flow", "before")}
+    listed = np.arange(classes) >= np.argmax(work.listed)
+    by_class = {
+        f: enlarged(getattr(work, f), classes) for f in ("number", "room", "flow", "before")
+    }
     by_pair = {
         f: enlarged(getattr(work, f), pairs)
-        for f in ("weight", "share", "alias", "first", "second", "queue")
+        for f in ("weight", "share", "alias", "classes", "queue")
     }
-    return work._replace(high=high, low=low, where=where, **by_class, **by_pair)
+    return work._replace(high=high, low=low, listed=listed, where=where, **by_class, **by_pair)
 
 
 def _more_chunks(work: Work) -> Work:

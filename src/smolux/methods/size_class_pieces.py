@@ -58,12 +58,14 @@ class Work(NamedTuple):
         Sizes.
     weight, share : float64 arrays of shape (R, P)
     alias : int32 array of shape (R, P)
-    first, second : int16 arrays of shape (R, P)
-        Classes of each pair in the table.
+    classes : int32 array of shape (R, P)
+        The two classes of each pair in the table, 16 bits each.
     queue : int32 array of shape (R, P)
         Scratch.
-    pair, one, two : int64 arrays of shape (R, AHEAD)
-        Candidates drawn ahead: column of the table and the two places.
+    one, two : int64 arrays of shape (R, AHEAD)
+        Candidates drawn ahead: class and slot of the two particles.
+    listed : bool array of shape (G,)
+        Whether a class is a list.
     high, low : float64 arrays of shape (G, G)
         Bounds of the rate for each pair of classes, the lower one as a share of the upper; `low` is
         NaN until asked for, `high` also where there is no finite bound.
@@ -80,12 +82,11 @@ class Work(NamedTuple):
     weight: np.ndarray
     share: np.ndarray
     alias: np.ndarray
-    first: np.ndarray
-    second: np.ndarray
+    classes: np.ndarray
     queue: np.ndarray
-    pair: np.ndarray
     one: np.ndarray
     two: np.ndarray
+    listed: np.ndarray
     high: np.ndarray
     low: np.ndarray
 
@@ -104,27 +105,27 @@ def _view(w, r):
         w.weight[r],
         w.share[r],
         w.alias[r],
-        w.first[r],
-        w.second[r],
+        w.classes[r],
         w.queue[r],
-        w.pair[r],
         w.one[r],
         w.two[r],
+        w.listed,
         w.high,
         w.low,
     )
 
 
 @piece
-def _is_list(w, g):
-    return g >> (w.meta[BITS] + 1) > 0
+def _place(w, g, slot):
+    """Place of a particle of a list in the pool."""
+    return place_of(w.where, g, slot, w.meta[CHUNK])
 
 
 @piece
 def _size(w, g, slot):
-    if _is_list(w, g):
-        return np.int64(w.pool[place_of(w.where, g, slot, w.meta[CHUNK])])
-    return np.int64(g)
+    if not w.listed[g]:
+        return np.int64(g)
+    return np.int64(w.pool[_place(w, g, slot)])
 
 
 @piece
@@ -137,23 +138,18 @@ def _pair(s, w):
 
 
 @piece
-def _ask(w, g, slot):
-    """Ask for the memory of a place, if a particle is there."""
-    if _is_list(w, g) and slot < w.number[g]:
-        prefetch(w.pool, place_of(w.where, g, slot, w.meta[CHUNK]))
-
-
-@piece
 def _draw_ahead(s, w):
     """Draw candidates: they depend on the table alone, not on the events in between."""
     pairs = w.meta[PAIRS]
     for k in range(AHEAD):
-        c = outcome(w.share, w.alias, pairs, rng.uniform(s.rng))
-        g, h = np.int64(w.first[c]), np.int64(w.second[c])
+        classes = w.classes[outcome(w.share, w.alias, pairs, rng.uniform(s.rng))]
+        g, h = np.int64(classes >> 16), np.int64(classes & 0xFFFF)
         a, b = rng.below(s.rng, w.room[g]), rng.below(s.rng, w.room[h])
-        w.pair[k], w.one[k], w.two[k] = c, a, b
-        _ask(w, g, a)
-        _ask(w, h, b)
+        w.one[k], w.two[k] = (g << _SLOT_BITS) | a, (h << _SLOT_BITS) | b
+        if w.listed[g]:
+            prefetch(w.pool, _place(w, g, a))
+        if w.listed[h]:
+            prefetch(w.pool, _place(w, h, b))
     w.meta[NEXT] = 0
 
 
@@ -190,15 +186,15 @@ def _make_draw(rate: Any) -> Any:
             w.meta[NEXT] = k + 1
             s.count[TRIALS] += 1
             wait += rng.exponential(s.rng)
-            c, a, b = w.pair[k], w.one[k], w.two[k]
-            g, h = np.int64(w.first[c]), np.int64(w.second[c])
-            if a >= w.number[g] or b >= w.number[h] or (g == h and a == b):
+            one, two = w.one[k], w.two[k]
+            g, a, h, b = one >> _SLOT_BITS, one & _SLOT, two >> _SLOT_BITS, two & _SLOT
+            if a >= w.number[g] or b >= w.number[h] or one == two:
                 continue
             taken = accepts(s, w, g, h, a, b, p)
             if taken < 0:
                 return math.nan
             if taken == 1:
-                s.count[FIRST], s.count[SECOND] = (g << _SLOT_BITS) | a, (h << _SLOT_BITS) | b
+                s.count[FIRST], s.count[SECOND] = one, two
                 break
         return wait * s.clock[VOLUME] / (s.clock[MAJORANT] * factor)
 
@@ -210,9 +206,9 @@ def _remove(s, w, g, slot):
     """Take a particle out: the last of its class moves into the gap."""
     last = w.number[g] - 1
     w.number[g] = last
-    if _is_list(w, g):
+    if w.listed[g]:
+        w.pool[_place(w, g, slot)] = w.pool[_place(w, g, last)]
         bits = w.meta[CHUNK]
-        w.pool[place_of(w.where, g, slot, bits)] = w.pool[place_of(w.where, g, last, bits)]
         if last & ((1 << bits) - 1) == 0:
             w.meta[FREE] = return_chunk(w.where, w.free, w.meta[FREE], g, last >> bits)
 
@@ -224,14 +220,14 @@ def _append(w, g, size):
     slot = w.number[g]
     if slot & ((1 << bits) - 1) == 0:
         w.meta[FREE] = take_chunk(w.where, w.free, w.meta[FREE], g, slot >> bits)
-    w.pool[place_of(w.where, g, slot, bits)] = size
+    w.pool[_place(w, g, slot)] = size
     w.number[g] = slot + 1
 
 
 @piece
 def _insert(s, w, size, count):
     g = slot_of(size, w.meta[BITS])
-    if _is_list(w, g):
+    if w.listed[g]:
         for _ in range(count):
             _append(w, g, size)
     else:
@@ -250,7 +246,7 @@ def _fits(s, w, entries):
         size, g = s.sizes[e], slot_of(s.sizes[e], w.meta[BITS])
         if g >= w.number.shape[0] or size > w.meta[WIDEST]:
             return False
-        if _is_list(w, g):
+        if w.listed[g]:
             chunks += (s.counts[e] >> w.meta[CHUNK]) + 1
             if (w.number[g] + s.counts[e]) >> w.meta[CHUNK] >= w.where.shape[1]:
                 return False
@@ -282,14 +278,19 @@ def _give_room(s, w, used):
     """
     since = float(max(s.count[SINCE], 1))
     n, pairs = float(s.count[PARTICLES]), 0.5 * used * (used + 1)
+    most = w.where.shape[1] << w.meta[CHUNK]
+    # every class should have room at once, for which its own scatter is not enough
+    scatter = 1.0 + math.sqrt(2.0 * math.log(used + 1.0))
     events = max(min(math.sqrt(n * (16.0 + 0.25 * pairs)), 0.25 * n, 32.0 * since + 64.0), 1.0)
     w.meta[BLOCK] = np.int64(events)
     for k in range(used):
         g = w.queue[k]
         gain = events * (w.number[g] - w.before[g]) / since
         flow = events * w.flow[g] / since
-        slack = 1.2 * max(gain, 0.0) + 4.0 * math.sqrt(flow + 0.25)
+        slack = 1.2 * max(gain, 0.0) + scatter * math.sqrt(flow) + 1.5
         w.room[g] = w.number[g] + np.int64(slack)
+        if w.listed[g]:
+            w.room[g] = min(w.room[g], most)
         w.before[g] = w.number[g]
         w.flow[g] = 0
 
@@ -308,7 +309,7 @@ def _weigh(s, w, used):
                 return False
             if weight > 0.0:
                 w.weight[pairs] = weight
-                w.first[pairs], w.second[pairs] = g, h
+                w.classes[pairs] = (g << 16) | h
                 total += weight
                 pairs += 1
     s.clock[MAJORANT] = total
@@ -353,7 +354,7 @@ def _double(s, w):
     bits = w.meta[CHUNK]
     chunks = np.int64(0)
     for g in range(w.number.shape[0]):
-        if _is_list(w, g):
+        if w.listed[g]:
             end = (2 * w.number[g]) >> bits
             chunks += end - (w.number[g] >> bits) + 1
             if end >= w.where.shape[1]:
@@ -362,9 +363,9 @@ def _double(s, w):
         return False
     for g in range(w.number.shape[0]):
         n = w.number[g]
-        if _is_list(w, g):
+        if w.listed[g]:
             for slot in range(n):
-                _append(w, g, w.pool[place_of(w.where, g, slot, bits)])
+                _append(w, g, w.pool[_place(w, g, slot)])
         else:
             w.number[g] = 2 * n
         w.before[g] *= 2
@@ -379,7 +380,7 @@ def _visit(s, w, t, grid):
     for g in range(1, w.number.shape[0]):
         if w.number[g] == 0:
             continue
-        if not _is_list(w, g):
+        if not w.listed[g]:
             tally_one(t, grid, np.int64(g), w.number[g])
             largest = np.int64(g)
             continue
