@@ -74,8 +74,7 @@ class LowRank(Method):
     work_type: ClassVar[type] = Work
     #: whether the majorant is one product, with both factors the same
     single: ClassVar[bool] = False
-    #: a majorant that is found needs bounds for all pairs of slots, so these are fewer, and again if
-    #: bounds are sampled, which takes long
+    #: bits for a majorant that is found, which needs bounds for all pairs of slots: sampled, proved
     _found_bits: ClassVar[tuple[int, int]] = (2, 3)
 
     def __post_init__(self) -> None:
