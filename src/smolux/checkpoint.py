@@ -14,6 +14,7 @@ import numpy as np
 from .core.state import State, Tally, Windows
 from .errors import InputError, did_you_mean
 from .files import replacing
+from .goal import goal_from_dict
 from .methods import METHODS
 from .model import Model
 from .model_dict import model_from_dict, model_to_dict
@@ -36,6 +37,7 @@ def _plan_to_dict(plan: Plan) -> dict[str, Any]:
         "times": list(plan.times),
         "method": {"name": plan.method.name, **asdict(plan.method)},  # type: ignore[call-overload]
         "weighting": {"name": plan.weighting.name, **asdict(plan.weighting)},  # type: ignore[call-overload]
+        "reason": plan.reason,
         "population": plan.population,
         "particles": plan.particles,
         "replicas": plan.replicas,
@@ -44,6 +46,7 @@ def _plan_to_dict(plan: Plan) -> dict[str, Any]:
         "sizes": plan.sizes,
         "bins_per_octave": plan.bins_per_octave,
         "distribution": plan.distribution,
+        "goal": None if plan.goal is None else asdict(plan.goal),
     }
 
 
@@ -67,6 +70,7 @@ def _plan_from_dict(given: dict[str, Any], model: Model | None) -> Plan:
         weighting=named(values.pop("weighting"), WEIGHTINGS, "weighting"),
         entropy=int(values.pop("entropy")),
         orders=tuple(values.pop("orders")),
+        goal=goal_from_dict(values.pop("goal", None)),
         **values,
     )
 

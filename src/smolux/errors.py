@@ -44,6 +44,10 @@ class Interrupted(KeyboardInterrupt):
         self.checkpoint = checkpoint
 
 
+class WorkerError(RuntimeError):
+    """The processes that compute die, again and again: no memory, a crash, a node that is gone."""
+
+
 class SmoluxWarning(UserWarning):
     """Something the user should know of a result: also stored in its attributes."""
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .core.state import CLOCKS, DOUBLINGS, EXTINCT, FLOOR, REPAIRS, TRIALS, WORST_I, WORST_J
 from .plan import Plan
 from .records import Records
 from .replicas import Group
+
+Float = NDArray[np.float64]
 
 
 def to_records(plan: Plan, groups: Sequence[Group]) -> Records:
@@ -60,9 +63,39 @@ def to_records(plan: Plan, groups: Sequence[Group]) -> Records:
     )
 
 
+def observable(plan: Plan, groups: Sequence[Group]) -> tuple[Float, NDArray[np.bool_]]:
+    """Return what the goal of a plan is about, at all output times of replicas that are done.
+
+    Returns
+    -------
+    values : ndarray of shape (R, T)
+    moved : ndarray of bool, shape (T,)
+        Whether anything has happened in any replica.
+    """
+    assert plan.goal is not None
+    scalars = np.concatenate([g.tally.scalars for g in groups])
+    _, particles, collisions, volume, largest = np.moveaxis(scalars, -1, 0)
+    values = particles / volume
+    if plan.goal.target == "largest":
+        values = largest
+    elif plan.goal.size is not None:
+        count = np.concatenate([g.tally.counts[:, :, plan.goal.size] for g in groups])
+        values = count * plan.weighting.stands_for(np.array([float(plan.goal.size)])) / volume
+    elif plan.goal.order is not None:
+        sizes = np.arange(1, plan.sizes + 1, dtype=float)
+        powers = sizes**plan.goal.order * plan.weighting.stands_for(sizes)
+        column = plan.orders.index(plan.goal.order)
+        sums = [g.tally.counts[:, :, 1:] @ powers + g.tally.sums[..., column] for g in groups]
+        values = np.concatenate(sums) / volume
+    return values, (collisions > 0).any(axis=0)
+
+
 def _attributes(plan: Plan, groups: Sequence[Group]) -> dict[str, object]:
-    return {
+    goal = plan.goal
+    wanted = {} if goal is None else {"target": goal.target, "target_error": goal.error}
+    return wanted | {
         "method": plan.method.name,
+        "method_reason": plan.reason or "asked for",
         "method_settings": dict(vars(plan.method)),
         "weighting": plan.weighting.name,
         "population": plan.population,

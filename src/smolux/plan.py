@@ -5,16 +5,19 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .assembly import rates_for
 from .core.state import Grid
 from .errors import InputError, did_you_mean
+from .goal import Goal, make_goal
 from .methods import METHODS
+from .methods.auto import Auto, choose
 from .methods.base import Method
 from .model import Model
 from .population import POPULATIONS
@@ -38,6 +41,10 @@ class Plan:
     sizes: int
     bins_per_octave: int
     distribution: bool
+    #: why the method was chosen, if it was
+    reason: str = ""
+    #: what replicas are added for; `replicas` are those planned so far
+    goal: Goal | None = None
 
     @property
     def volume(self) -> float:
@@ -52,11 +59,11 @@ class Plan:
         edges = np.unique([int(first * 2.0 ** (k / self.bins_per_octave)) for k in steps])
         return Grid(np.array(self.times), edges.astype(np.int64), np.array(self.orders))
 
-    def groups(self, workers: int) -> list[tuple[int, int]]:
-        """Split the replicas: first and number of each group."""
+    def groups(self, workers: int, start: int = 0) -> list[tuple[int, int]]:
+        """Split the replicas from `start` on: first and number of each group."""
         together = max(1, 200_000 // self.particles)
-        each = max(1, min(together, -(-self.replicas // max(workers, 1))))
-        return [(r, min(each, self.replicas - r)) for r in range(0, self.replicas, each)]
+        each = max(1, min(together, -(-(self.replicas - start) // max(workers, 1))))
+        return [(r, min(each, self.replicas - r)) for r in range(start, self.replicas, each)]
 
 
 def make_plan(
@@ -72,6 +79,9 @@ def make_plan(
     sizes: int,
     bins_per_octave: int,
     distribution: bool,
+    target_error: float | None = None,
+    target: str = "number_density",
+    max_replicas: int = 1000,
 ) -> Plan:
     """Check the arguments of `simulate`, all at once; parameters as there.
 
@@ -84,7 +94,7 @@ def make_plan(
     if not isinstance(model, Model):
         problems.append(f"model = {model!r}: must be a smolux.Model(kernel=..., ...)")
     found = {
-        "method": _chosen("method", method, METHODS, Method, problems),
+        "method": _chosen("method", method, (*METHODS, Auto), Method, problems),
         "weighting": _chosen("weighting", weighting, WEIGHTINGS, Weighting, problems),
     }
     if population not in POPULATIONS:
@@ -103,6 +113,9 @@ def make_plan(
     )
     output = check_times(times, problems)
     powers = _orders(orders, problems)
+    goal = make_goal(
+        target_error, target, max_replicas, replicas, powers, numbers["sizes"], problems
+    )
     if problems:
         raise InputError(problems)
     plan = Plan(
@@ -112,11 +125,30 @@ def make_plan(
         entropy=int(entropy),  # type: ignore[arg-type]
         orders=powers,
         distribution=bool(distribution),
+        goal=goal,
         **found,
         **numbers,  # type: ignore[arg-type]
     )
-    _check_memory(plan)
+    if isinstance(plan.method, Auto):
+        plan = _with_method(plan)
+    check_memory(plan)
     return plan
+
+
+def _with_method(plan: Plan) -> Plan:
+    """Let the method be chosen."""
+    initial, processes = plan.model.initial, plan.model.processes
+    sizes, counts = initial.sample(min(plan.particles, 1000), 0.5)
+    mean = float(sizes @ counts) / float(counts.sum())
+    method, reason = choose(
+        rates_for(plan.model, plan.weighting),
+        processes,
+        plan.particles,
+        initial.total,
+        mean,
+        plan.times[-1],
+    )
+    return replace(plan, method=method, reason=reason)
 
 
 def _chosen(what: str, value: Any, registry: Sequence[Any], kind: type, problems: list[str]) -> Any:
@@ -171,8 +203,15 @@ def check_times(times: ArrayLike, problems: list[str]) -> tuple[float, ...]:
     return tuple(float(t) for t in output.ravel())
 
 
-def _check_memory(plan: Plan) -> None:
-    """Refuse a run whose arrays cannot fit, before anything is computed."""
+def check_memory(plan: Plan, done: int = 0) -> None:
+    """Refuse a run whose arrays cannot fit, before anything is computed.
+
+    Of the replicas that are `done`, only what was observed is kept.
+
+    Raises
+    ------
+    InputError
+    """
     try:
         available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):  # not known on this system
@@ -180,7 +219,7 @@ def _check_memory(plan: Plan) -> None:
     grid = plan.grid
     row = 8 * (plan.sizes + len(grid.edges) + len(grid.orders) + 8)
     observations = plan.replicas * len(plan.times) * row
-    stores = plan.replicas * plan.method.bytes_per_replica(plan.particles)
+    stores = (plan.replicas - done) * plan.method.bytes_per_replica(plan.particles)
     if observations + stores > 0.9 * available:
         raise InputError(
             f"the run needs about {(observations + stores) / 1e9:.1f} GB ({stores / 1e9:.1f} GB of "

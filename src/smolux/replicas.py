@@ -148,6 +148,12 @@ class Group:
             if stop():
                 return
 
+    def release(self) -> None:
+        """Give up the particles of replicas that are done; what was observed stays."""
+        if self.done:
+            empty = {k: v[:0].copy() for k, v in self.work._asdict().items() if np.ndim(v)}
+            self.work = self.work._replace(**empty)
+
     def _effort(self) -> int:
         return int(self.state.count[:, (TRIALS, EVENTS)].sum())
 

@@ -3,62 +3,35 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_EXCEPTION, Executor, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
-from threading import Event
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checkpoint as checkpoints
-from .errors import InputError, Interrupted
+from .driving import Elsewhere, Progress, Threads
+from .errors import InputError
+from .executors import adapted, cores, workers_of
 from .methods.base import Method
 from .model import Model
-from .observe import to_records
-from .plan import Plan, make_plan
+from .plan import make_plan
 from .replicas import Group
-from .results import to_dataset
 from .weighting.base import Weighting
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_TICK = 0.2
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a run is.
-
-    Attributes
-    ----------
-    events : int
-        Collisions so far, over all replicas.
-    fraction : float
-        Share of the simulated time that is done, 0 to 1.
-    events_per_second : float
-    seconds_left : float
-        Estimated from the simulated time done so far; NaN when nothing is known yet.
-    compile_seconds : float
-        Spent on compiling, not counted in the rate.
-    """
-
-    events: int
-    fraction: float
-    events_per_second: float
-    seconds_left: float
-    compile_seconds: float
+__all__ = ["Progress", "resume", "simulate"]
 
 
 def simulate(
     model: Model,
     times: ArrayLike,
     *,
-    method: str | Method = "acceptance-rejection",
+    method: str | Method = "auto",
     weighting: str | Weighting = "number",
     population: str = "doubling",
     particles: int = 100_000,
@@ -73,6 +46,9 @@ def simulate(
     checkpoint: str | os.PathLike[str] | None = None,
     checkpoint_every: float = 600.0,
     time_limit: float | None = None,
+    target_error: float | None = None,
+    target: str = "number_density",
+    max_replicas: int = 1000,
 ) -> xr.Dataset:
     """Simulate the exact jump process of a model (Marcus-Lushnikov), several replicas of it.
 
@@ -83,7 +59,9 @@ def simulate(
     times : array_like of shape (T,)
         Output times, ascending, zero or more.
     method : str or Method
-        How the next pair is found, see `smolux.methods.METHODS`.
+        How the next pair is found, see `smolux.methods.METHODS`; "auto" estimates the cost of an
+        event and chooses, and the attributes ``method`` and ``method_reason`` of the result say
+        what and why.
     weighting : str or Weighting
         What one simulated particle stands for, see `smolux.weighting.WEIGHTINGS`.
     population : {"doubling", "fixed-volume", "none"}
@@ -105,8 +83,9 @@ def simulate(
     distribution : bool
         Keep the whole population at each time.
     executor : concurrent.futures.Executor, optional
-        Where groups of replicas run; threads of this process if left out. Other executors than
-        threads run without progress and checkpoints.
+        Where groups of replicas run; threads of this process if left out. Also the client of a Dask
+        cluster. Other executors than threads run without checkpoints, and progress is that of
+        whole groups. Groups whose worker died are run again.
     progress : callable, optional
         Called with a `Progress` a few times a second.
     checkpoint : path, optional
@@ -116,6 +95,14 @@ def simulate(
         Seconds between checkpoints.
     time_limit : float, optional
         Wall seconds after which the run stops as if interrupted.
+    target_error : float, optional
+        Replicas are added to the first `replicas`, at least 8, until the half width of the 95 %
+        interval of the `target` over its mean is at most this at every output time. The result is
+        that of a run with so many replicas from the start, bit for bit.
+    target : str
+        ``"number_density"``, ``"largest"``, ``"M2"`` (any of the `orders`) or ``"n_5"`` (any size).
+    max_replicas : int
+        Where adding replicas ends; then the result has a warning.
 
     Returns
     -------
@@ -129,6 +116,8 @@ def simulate(
     Interrupted
         On Ctrl-C, or past the time limit; holds the dataset of what was reached, and the
         checkpoint from which `resume` goes on, bit for bit.
+    WorkerError
+        If processes of an executor die again and again.
 
     Notes
     -----
@@ -144,21 +133,24 @@ def simulate(
     >>> float(ds["moment"].sel(order=1).mean())
     1.0
     """
+    executor = adapted(executor)
     problems = _control_problems(executor, progress, checkpoint, checkpoint_every, time_limit)
     try:
         plan = make_plan(
             model, times, method, weighting, population, particles, replicas, seed, orders, sizes,
-            bins_per_octave, distribution,
+            bins_per_octave, distribution, target_error, target, max_replicas,
         )  # fmt: skip
     except InputError as error:
         raise InputError([*error.problems, *problems]) from None
     if problems:
         raise InputError(problems)
     if executor is not None and not isinstance(executor, ThreadPoolExecutor):
-        return _elsewhere(plan, executor)
+        return Elsewhere(plan, executor, progress, workers_of(executor)).finish()
     groups = [Group.start(plan, *part) for part in plan.groups(_workers())]
-    run = _Run(plan, groups, executor, progress, checkpoint, checkpoint_every, time_limit)
-    return run.finish()
+    file = None if checkpoint is None else Path(checkpoint).expanduser()
+    return Threads(
+        plan, groups, executor, progress, file, checkpoint_every, time_limit, _workers()
+    ).finish()
 
 
 def resume(
@@ -193,9 +185,11 @@ def resume(
     problems = _control_problems(executor, progress, checkpoint, checkpoint_every, time_limit)
     if problems:
         raise InputError(problems)
-    plan, groups = checkpoints.load(Path(checkpoint).expanduser(), model)
-    run = _Run(plan, groups, executor, progress, checkpoint, checkpoint_every, time_limit)
-    return run.finish()
+    file = Path(checkpoint).expanduser()
+    plan, groups = checkpoints.load(file, model)
+    return Threads(
+        plan, groups, executor, progress, file, checkpoint_every, time_limit, _workers()
+    ).finish()
 
 
 def _control_problems(
@@ -238,132 +232,4 @@ def _path_problems(checkpoint: Any) -> list[str]:
 
 
 def _workers() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-class _Run:
-    """Groups of replicas on threads: progress, checkpoints, interruption."""
-
-    def __init__(
-        self,
-        plan: Plan,
-        groups: list[Group],
-        executor: ThreadPoolExecutor | None,
-        progress: Callable[[Progress], None] | None,
-        checkpoint: str | os.PathLike[str] | None,
-        checkpoint_every: float,
-        time_limit: float | None,
-    ) -> None:
-        self.plan, self.groups, self.executor, self.progress = plan, groups, executor, progress
-        self.checkpoint = None if checkpoint is None else Path(checkpoint).expanduser()
-        self.every = checkpoint_every
-        self.limit = np.inf if time_limit is None else time_limit
-        self.started = time.perf_counter()
-        self.compile_seconds = 0.0
-        self.unsaved = ""
-
-    def finish(self) -> xr.Dataset:
-        """Run to the end, or raise `Interrupted` with what there is."""
-        reason = ""
-        try:
-            self.groups[0].compile()
-            self.compile_seconds = self.groups[0].compile_seconds
-            reason = self._drive()
-        except KeyboardInterrupt:
-            reason = "interrupted"
-        if reason:
-            self._save()
-            where = f"; go on from {self.checkpoint}" if self.checkpoint else ""
-            raise Interrupted(
-                f"{reason}{where}{self.unsaved and '; ' + self.unsaved}",
-                self._dataset(),
-                self.checkpoint,
-            )
-        return self._dataset()
-
-    def _drive(self) -> str:
-        """Advance all groups; return why it stopped early, or nothing."""
-        pool = self.executor or ThreadPoolExecutor(_workers())
-        try:
-            while True:
-                self._stretch(pool)
-                if all(g.done for g in self.groups):
-                    return ""
-                if time.perf_counter() - self.started > self.limit:
-                    return f"stopped at the time limit of {self.limit:g} s"
-                self._save()
-        finally:
-            if self.executor is None:
-                pool.shutdown()
-
-    def _stretch(self, pool: Executor) -> None:
-        """Advance all groups until they are done, or until a checkpoint or the limit is due."""
-        halt = Event()
-        begun, events = time.perf_counter(), float(sum(g.events for g in self.groups))
-        due = min(begun + self.every if self.checkpoint else np.inf, self.started + self.limit)
-        waiting = [pool.submit(g.advance, halt.is_set) for g in self.groups if not g.done]
-        try:
-            while waiting and time.perf_counter() < due:
-                tick = min(_TICK, 0.01 + 0.1 * (time.perf_counter() - begun))
-                ended, left = wait(waiting, tick, FIRST_EXCEPTION)
-                for future in ended:
-                    future.result()
-                waiting = list(left)
-                self._report(begun, events)
-        finally:
-            halt.set()
-            for future in waiting:
-                future.exception()
-        for future in waiting:
-            future.result()
-
-    def _report(self, begun: float, events_before: float) -> None:
-        if self.progress is None:
-            return
-        events = sum(g.events for g in self.groups)
-        sizes = [len(g.codes) for g in self.groups]
-        fraction = float(np.average([g.fraction for g in self.groups], weights=sizes))
-        elapsed = time.perf_counter() - begun
-        spent = time.perf_counter() - self.started - self.compile_seconds
-        left = spent * (1 - fraction) / fraction if fraction > 0 else np.nan
-        rate = (events - events_before) / elapsed if elapsed > 0 else 0.0
-        self.progress(Progress(events, fraction, rate, left, self.compile_seconds))
-
-    def _save(self) -> None:
-        if self.checkpoint is None:
-            return
-        try:
-            checkpoints.save(self.checkpoint, self.plan, self.groups)
-            self.unsaved = ""
-        except (OSError, InputError) as error:  # a full disk must not cost what is computed
-            self.unsaved = f"no checkpoint was written: {error}"
-
-    def _dataset(self) -> xr.Dataset:
-        records = to_records(self.plan, self.groups)
-        records.attributes["wall_seconds"] = time.perf_counter() - self.started
-        if self.unsaved:
-            records.warnings.append(self.unsaved)
-        return to_dataset(self.plan.model, records)
-
-
-def _run_group(plan: Plan, first: int, count: int) -> Group:
-    """Run a group to its end, in a worker of any executor."""
-    group = Group.start(plan, first, count)
-    group.compile()
-    group.advance(lambda: False)
-    return group
-
-
-def _elsewhere(plan: Plan, executor: Executor) -> xr.Dataset:
-    started = time.perf_counter()
-    workers = getattr(executor, "_max_workers", None) or _workers()
-    futures = [executor.submit(_run_group, plan, *part) for part in plan.groups(workers)]
-    try:
-        groups = [f.result() for f in futures]
-    except BaseException:
-        for future in futures:
-            future.cancel()
-        raise
-    records = to_records(plan, groups)
-    records.attributes["wall_seconds"] = time.perf_counter() - started
-    return to_dataset(plan.model, records)
+    return cores()

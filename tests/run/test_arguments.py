@@ -101,7 +101,7 @@ def test_memory_is_refused_before_anything_is_computed(monkeypatch: pytest.Monke
     assert "sizes = 10000000" in message
     # what cannot be known is no obstacle
     monkeypatch.delattr(plan.os, "sysconf")
-    assert plan._check_memory(plan.make_plan(
+    assert plan.check_memory(plan.make_plan(
         MODEL, [1.0], "inverse", "number", "none", 10, 1, 1, (0,), 10**9, 4, False,
     )) is None  # fmt: skip
 

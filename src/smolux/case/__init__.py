@@ -20,12 +20,22 @@ from ..model import Model
 from .lines import Path, line_numbers
 from .physics import build, model_tables, read_physics
 from .reader import Problems, Table
-from .settings import Output, Run, Solve, as_table, read_output, read_run, read_solve
+from .settings import (
+    Output,
+    Parallel,
+    Run,
+    Solve,
+    as_table,
+    read_output,
+    read_parallel,
+    read_run,
+    read_solve,
+)
 from .write import to_toml
 
-__all__ = ["Case", "Output", "Run", "Solve", "load", "parse"]
+__all__ = ["Case", "Output", "Parallel", "Run", "Solve", "load", "parse"]
 
-_TABLES = ("kernel", "processes", "initial", "run", "solve", "output")
+_TABLES = ("kernel", "processes", "initial", "run", "solve", "parallel", "output")
 
 
 @dataclass(frozen=True)
@@ -42,6 +52,8 @@ class Case:
         How it is solved deterministically, if it is.
     output : Output
         What is written beside the results.
+    parallel : Parallel
+        Where it is computed.
     title : str
         A line for figures and reports.
     si : bool
@@ -54,6 +66,7 @@ class Case:
     run: Run | None = None
     solve: Solve | None = None
     output: Output = field(default_factory=Output)
+    parallel: Parallel = field(default_factory=Parallel)
     title: str = ""
     si: bool = False
     origin: str = field(default="", compare=False)
@@ -89,6 +102,8 @@ class Case:
                     tables[name]["times"] = [units.text(float(t), units.TIME) for t in times]
         if self.run and self.solve:
             del tables["solve"]["times"]
+        if self.parallel != Parallel():
+            tables["parallel"] = as_table(self.parallel)
         tables["output"] = as_table(self.output)
         comment = f"# {self.origin}\n\n" if self.origin else ""
         return comment + to_toml(tables)
@@ -185,12 +200,13 @@ def _read(content: Mapping[str, Any], problems: Problems) -> Case:
         problems.add(
             (), "a table [run] is missing, with times = [...]; or [solve] for the solver alone"
         )
+    parallel = read_parallel(content.get("parallel", {}), run, problems)
     output = read_output(content.get("output", {}), problems)
     si = problems.check_units()
     model = build(physics, si, problems) if physics_is_good else None
     problems.raise_if_any()
     assert model is not None
-    return Case(model, run, solve, output, title, si, physics.origin)
+    return Case(model, run, solve, output, parallel, title, si, physics.origin)
 
 
 # --- changes from the command line ----------------------------------------------------------

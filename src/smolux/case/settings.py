@@ -1,4 +1,4 @@
-"""The tables that say how a case is computed and shown: ``[run]``, ``[solve]``, ``[output]``."""
+"""The tables on how a case is computed and shown: run, solve, parallel, output."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from .. import units
-from ..errors import did_you_mean
+from ..errors import InputError, did_you_mean
+from ..executors import KINDS
+from ..goal import make_goal
 from ..population import POPULATIONS
 from .reader import Problems, Table, show
 
@@ -33,7 +35,7 @@ class Run:
     particles: int = 100_000
     replicas: int = 8
     seed: int | None = None
-    method: str = "acceptance-rejection"
+    method: str = "auto"
     weighting: str = "number"
     population: str = "doubling"
     orders: tuple[float, ...] = (0, 1, 2, 3)
@@ -42,6 +44,18 @@ class Run:
     distribution: bool = False
     checkpoint_every: float = 600.0
     time_limit: float | None = None
+    target_error: float | None = None
+    target: str = "number_density"
+    max_replicas: int = 1000
+
+
+@dataclass(frozen=True)
+class Parallel:
+    """Where a case is computed; the arguments of `smolux.executors.opened`."""
+
+    executor: str = "threads"
+    workers: int | None = None
+    address: str | None = None
 
 
 @dataclass(frozen=True)
@@ -78,7 +92,7 @@ def read_run(content: Any, problems: Problems) -> Run | None:
         "particles": table.integer("particles", Run.particles, 2, 2**40),
         "replicas": table.integer("replicas", Run.replicas, 1, 1_000_000),
         "seed": table.integer("seed", None, 0),
-        "method": table.choice("method", Run.method, [m.name for m in METHODS]),
+        "method": table.choice("method", Run.method, ["auto", *(m.name for m in METHODS)]),
         "weighting": table.choice("weighting", Run.weighting, [w.name for w in WEIGHTINGS]),
         "population": table.choice("population", Run.population, list(POPULATIONS)),
         "orders": read_orders(table),
@@ -88,8 +102,40 @@ def read_run(content: Any, problems: Problems) -> Run | None:
         "checkpoint_every": table.seconds("checkpoint_every", Run.checkpoint_every),
         "time_limit": table.seconds("time_limit", Run.time_limit),
     }
+    goal = {
+        "target_error": table.take("target_error"),
+        "target": table.take("target", Run.target),
+        "max_replicas": table.integer("max_replicas", Run.max_replicas, 1, 1_000_000),
+    }
+    wrong: list[str] = []
+    make_goal(
+        **goal, replicas=settings["replicas"], orders=settings["orders"], sizes=settings["sizes"],
+        problems=wrong,
+    )  # fmt: skip
+    keys = ("target_error", "target", "max_replicas", "replicas")
+    problems.add_error(("run",), InputError([f"{w}" for w in wrong]), keys)
     table.finish()
-    return Run(times, **settings) if times else None
+    return Run(times, **settings, **goal) if times and not wrong else None
+
+
+def read_parallel(content: Any, run: Run | None, problems: Problems) -> Parallel:
+    """Read ``[parallel]``."""
+    table = Table(content, ("parallel",), problems)
+    found = Parallel(
+        table.choice("executor", Parallel.executor, KINDS),
+        table.integer("workers", None, 1, 100_000),
+        table.text("address", "") or None,
+    )
+    if found.address is not None and found.executor != "dask":
+        table.bad("address", 'is only for executor = "dask"')
+    elif found.address is not None and found.workers is not None:
+        table.bad("workers", "the cluster at that address has those it has; take this line out")
+    if run is not None and run.time_limit is not None and found.executor != "threads":
+        table.bad(
+            "executor", "a run that can be stopped by run.time_limit needs threads; take one out"
+        )
+    table.finish()
+    return found
 
 
 def read_solve(content: Any, run_times: tuple[float, ...] | None, problems: Problems) -> Any:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..case import Case
+from ..case import Case, Parallel
 from ..case.physics import model_tables
+from ..case.settings import as_table
 from ..case.write import value
 from ..errors import InputError
 from .console import amount, duration
@@ -30,7 +31,8 @@ def text(case: Case, source: str) -> str:
         cost = estimate(case)
         warnings = cost.warnings
         lines += [
-            f"collisions   about {amount(cost.collisions)}, in {case.run.replicas} replicas",
+            f"collisions   about {amount(cost.collisions)}, in {case.run.replicas} replicas"
+            + (" at the start" if case.run.target_error is not None else ""),
             f"time         about {duration(cost.seconds)} on {cores()} cores, and a few seconds "
             "to compile",
             f"memory       about {amount(cost.memory, 'B')}",
@@ -60,6 +62,13 @@ def description(case: Case) -> list[str]:
             f"simulate     {run.method}, {run.particles} particles, {run.replicas} replicas, "
             f"{run.population}, seed {'new each time' if run.seed is None else run.seed}"
         )
+        if run.target_error is not None:
+            lines.append(
+                f"until        the 95 % interval of {run.target} is ±{100 * run.target_error:g} %, "
+                f"with at most {run.max_replicas} replicas"
+            )
+    if case.parallel != Parallel():
+        lines.append(f"parallel     {_words(as_table(case.parallel))}")
     if case.solve is not None:
         lines.append(f"solve        {case.solve.method}, tolerance {case.solve.tolerance:g}")
     return lines

@@ -182,9 +182,9 @@ def cores() -> int:
 
 
 def _bytes(case: Case, run: Run, small: Pilot) -> tuple[float, float]:
-    from ..methods import METHODS
+    from ..methods import METHODS, SizeClass
 
-    method = next(m for m in METHODS if m.name == run.method)()
+    method = next((m for m in METHODS if m.name == run.method), SizeClass)()
     mass = run.particles * mean_size(case)
     octaves = max(0.0, float(np.log2(max(mass, 2) / run.sizes)))
     columns = 8 + len(run.orders) + run.sizes + octaves * run.bins_per_octave

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -93,7 +94,8 @@ class Display:
         if self._bar is not None:
             self._bar.update(
                 self._task, total=1.0, completed=progress.fraction, description=self.what,
-                rate=rate(progress, self.unit), left=left(progress),
+                rate=", ".join(p for p in (rate(progress, self.unit), error(progress)) if p),
+                left=left(progress),
             )  # fmt: skip
         elif self.clock() >= self._due:
             self._due = self.clock() + self.every
@@ -138,12 +140,22 @@ def left(progress: Progress) -> str:
     return f"{duration(progress.seconds_left)} left" if known else ""
 
 
+def error(progress: Progress) -> str:
+    """Write how near a target error is: ``"±0.31 % of ±0.1 %, 16 replicas"``; often nothing."""
+    reached, wanted = (getattr(progress, k, math.nan) for k in ("error", "target_error"))
+    if not (math.isfinite(reached) and math.isfinite(wanted)):
+        return ""
+    replicas = getattr(progress, "replicas", 0)
+    return f"±{100 * reached:.2g} % of ±{100 * wanted:.2g} %, {replicas} replicas"
+
+
 def line(progress: Progress, unit: str = "events") -> str:
     """Write all in a line: ``"43 %, 1.2 M events, 2.1 M events/s, 40 s left"``."""
     parts = (
         f"{100 * progress.fraction:.0f} %",
         f"{amount(progress.events)} {unit}",
         rate(progress, unit),
+        error(progress),
         left(progress),
     )
     return ", ".join(part for part in parts if part)

@@ -18,7 +18,8 @@ from .. import results
 from ..case import Case, parse
 from ..deterministic import SolverError
 from ..deterministic.solver import solve
-from ..errors import InputError, Interrupted, SmoluxWarning
+from ..errors import InputError, Interrupted, SmoluxWarning, WorkerError
+from ..executors import opened
 from ..model_dict import model_to_dict
 from . import figures, report
 from .console import duration, say
@@ -78,6 +79,10 @@ def proceed(directory: RunDirectory, display: Callable[..., Display] = Display) 
         except KeyboardInterrupt as stop:
             reason = str(stop) if isinstance(stop, Interrupted) else "stopped"
             raise Interrupted(f"{reason}\ngo on with: smolux run {directory.path}") from None
+        except WorkerError as error:
+            raise Interrupted(
+                f"error: {error}\ntry again with: smolux run {directory.path}"
+            ) from None
         except OSError as error:
             if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS):
                 raise
@@ -139,7 +144,7 @@ def _finished(file: Path, case: Case, checkpoint: Path | None = None) -> Any:
 
 _CHANGED = (
     "case.toml: was changed since the run was begun; put it back, or start a new run of it with -o "
-    "(checkpoint_every, time_limit and [output] may be changed)"
+    "(checkpoint_every, time_limit, [parallel] and [output] may be changed)"
 )
 
 
@@ -156,9 +161,19 @@ def _check_plan(plan: Any, case: Case) -> None:
     InputError
         If it does not.
     """
+    goal = plan.goal
+    begun = {
+        "seed": plan.entropy,
+        "method": "auto" if plan.reason else plan.method.name,
+        "replicas": plan.replicas if goal is None else goal.first,
+        "target_error": None if goal is None else goal.error,
+        # without a goal they say nothing
+        "target": case.run.target if goal is None and case.run else goal and goal.target,
+        "max_replicas": case.run.max_replicas if goal is None and case.run else goal and goal.most,
+    }
     same = model_to_dict(plan.model) == model_to_dict(case.model)
     for name, value in _arguments(case).items():
-        found = getattr(plan, "entropy" if name == "seed" else name)
+        found = begun[name] if name in begun else getattr(plan, name)
         same = same and getattr(found, "name", found) == value
     if not same:
         raise InputError(_CHANGED)
@@ -167,29 +182,20 @@ def _check_plan(plan: Any, case: Case) -> None:
 def _simulate(
     case: Case, directory: RunDirectory, stopper: Stopper, display: Callable[..., Display]
 ) -> Any:
-    run = case.run
-    assert run is not None
-
     def check() -> None:
         # from the first call on there is something to lose
         stopper.patient = True
         stopper.check()
 
     with display(check=check) as progress:
-        settings: dict[str, Any] = {
-            "progress": progress,
-            "checkpoint_every": run.checkpoint_every,
-            "time_limit": run.time_limit,
-        }
         try:
-            if directory.checkpoint.is_file():
-                ds = smolux.resume(directory.checkpoint, **settings)
-            else:
-                ds = smolux.simulate(
-                    case.model, checkpoint=directory.checkpoint, **_arguments(case), **settings
-                )
+            ds = _computed(case, directory, progress)
         except Interrupted as stop:
             stopper.patient = True
+            if stop.dataset is None:  # it ran elsewhere
+                raise Interrupted(
+                    "stopped; nothing is kept of a run that is not on threads"
+                ) from None
             _store(stop.dataset, case, directory.results)
             share = f", {100 * progress.last.fraction:.0f} % done" if progress.last else ""
             raise Interrupted(f"{str(stop).partition(';')[0]}{share}") from None
@@ -204,6 +210,25 @@ def _simulate(
     stopper.patient = False
     stopper.check()
     return ds
+
+
+def _computed(case: Case, directory: RunDirectory, progress: Display) -> Any:
+    run, file = case.run, directory.checkpoint
+    assert run is not None
+    with opened(**asdict(case.parallel)) as executor:
+        if case.parallel.executor != "threads" and not file.is_file():
+            return smolux.simulate(
+                case.model, executor=executor, progress=progress, **_arguments(case)
+            )
+        settings: dict[str, Any] = {
+            "executor": executor if case.parallel.executor == "threads" else None,
+            "progress": progress,
+            "checkpoint_every": run.checkpoint_every,
+            "time_limit": run.time_limit,
+        }
+        if file.is_file():
+            return smolux.resume(file, **settings)
+        return smolux.simulate(case.model, checkpoint=file, **_arguments(case), **settings)
 
 
 def _arguments(case: Case) -> dict[str, Any]:

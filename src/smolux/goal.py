@@ -1,0 +1,206 @@
+"""Replicas until it is sure enough: a target for the interval of one observable."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import InputError, did_you_mean
+
+Float = NDArray[np.float64]
+
+#: fewest replicas from which an interval is judged: below, stopping when it happens to be short
+#: makes it too short
+FEWEST = 8
+#: observables with a name of their own; M2 and n_5 stand for any order and size
+TARGETS = ("number_density", "largest", "M2", "n_5")
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Replicas are added until the 95 % interval of an observable is short enough.
+
+    Attributes
+    ----------
+    target : str
+        ``number_density``, ``largest``, ``M<order>`` or ``n_<size>``.
+    error : float
+        Half width of the interval over the mean that is wanted, at every output time.
+    first, most : int
+        Replicas at the start, and at the most.
+    """
+
+    target: str
+    error: float
+    first: int
+    most: int
+
+    @property
+    def order(self) -> float | None:
+        """Order of the moment, if it is one."""
+        return float(self.target[1:]) if self.target.startswith("M") else None
+
+    @property
+    def size(self) -> int | None:
+        """Size of the clusters, if it is a density of one size."""
+        return int(self.target[2:]) if self.target.startswith("n_") else None
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How near a goal is.
+
+    Attributes
+    ----------
+    error : float
+        The largest half width over the mean of all output times.
+    at : int
+        The output time of it.
+    needed : float
+        Replicas that will be about enough, of which no more than `Goal.most` are run.
+    following : int
+        Replicas to have before the next look; as many as there are if it is over.
+    """
+
+    error: float
+    at: int
+    needed: float
+    following: int
+
+
+def judge(goal: Goal, values: Float, moved: NDArray[np.bool_]) -> Verdict:
+    """Say how near a goal is, and with how many replicas to look again.
+
+    The number of replicas at least doubles before the target is near, so that there are few looks:
+    each is a chance to stop because the interval happens to be short.
+
+    Parameters
+    ----------
+    goal : Goal
+    values : ndarray of shape (R, T)
+        The observable.
+    moved : ndarray of bool, shape (T,)
+        Whether anything has happened in any replica.
+    """
+    from scipy import stats
+
+    replicas = len(values)
+    mean, spread = values.mean(axis=0), values.std(axis=0, ddof=1)
+    half = stats.t.ppf(0.975, replicas - 1) * spread / math.sqrt(replicas)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = np.where(half > 0, half / np.abs(mean), 0.0)
+    # the same count in every replica, above all none, is luck and no proof of certainty
+    luck = moved & (half == 0) & ((mean == 0) | (goal.size is not None))
+    relative[luck] = np.inf
+    at = int(np.argmax(relative))
+    error = float(relative[at])
+    needed = replicas * max(error / goal.error, 0.0) ** 2
+    if error <= goal.error:
+        return Verdict(error, at, float(replicas), replicas)
+    following = max(replicas + max(1, replicas // 4), math.ceil(min(needed, 2 * replicas)))
+    return Verdict(error, at, needed, max(replicas, min(following, goal.most)))
+
+
+def shortfall(goal: Goal, verdict: Verdict, replicas: int, time: float) -> str:
+    """Warning of a run that ended before its goal was reached."""
+    if math.isinf(verdict.error):
+        return (
+            f"target_error = {goal.error:g} was not reached with {replicas} replicas: of "
+            f"{goal.target} too little was seen at t = {time:g} to give it an interval; use more "
+            "particles, or leave out this time"
+        )
+    return (
+        f"target_error = {goal.error:g} was not reached with {replicas} replicas: the 95 % "
+        f"interval of {goal.target} is ±{100 * verdict.error:.2g} % at t = {time:g}; it takes "
+        f"about {verdict.needed:.2g} replicas, or as many times more particles"
+    )
+
+
+def make_goal(
+    target_error: Any,
+    target: Any,
+    max_replicas: Any,
+    replicas: Any,
+    orders: Sequence[float],
+    sizes: int,
+    problems: list[str],
+) -> Goal | None:
+    """Check the arguments of `simulate` that make a goal; None if there is none.
+
+    What is wrong is added to `problems`.
+    """
+    name = _target(target, orders, sizes, problems)
+    most = _whole(max_replicas)
+    if most is None or most < 1:
+        problems.append(f"max_replicas = {max_replicas!r}: must be a whole number of at least 1")
+    if target_error is None:
+        return None
+    number = isinstance(target_error, (int, float, np.number)) and target_error is not True
+    if not (number and 0 < target_error < 1):
+        problems.append(
+            f"target_error = {target_error!r}: must be a number between 0 and 1, the half width of "
+            "the 95 % interval over the mean, such as 0.001"
+        )
+    first = _whole(replicas)
+    if first is not None and first < FEWEST:
+        problems.append(
+            f"replicas = {replicas!r}: with target_error at least {FEWEST}, with which the run "
+            "begins; fewer say too little of the scatter"
+        )
+    elif first is not None and most is not None and most < first:
+        problems.append(
+            f"max_replicas = {max_replicas!r}: must be at least replicas = {replicas!r}"
+        )
+    if problems or first is None or most is None:
+        return None
+    return Goal(name, float(target_error), first, most)
+
+
+def _whole(value: Any) -> int | None:
+    try:
+        whole = int(value)
+        return whole if whole == value and not isinstance(value, bool) else None
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _target(target: Any, orders: Sequence[float], sizes: int, problems: list[str]) -> str:
+    """Return the name of an observable; note what is wrong with it."""
+    where = f"target = {target!r}"
+    name = target if isinstance(target, str) else ""
+    if name in ("number_density", "largest"):
+        return name
+    if re.fullmatch(r"M-?\d+(\.\d+)?", name):
+        if float(name[1:]) not in orders:
+            listed = ", ".join(f"{p:g}" for p in orders)
+            problems.append(f"{where}: this moment is not computed; orders has {listed}")
+    elif re.fullmatch(r"n_\d+", name):
+        if not 1 <= int(name[2:]) <= sizes:
+            problems.append(f"{where}: sizes = {sizes} is the last that is counted by itself")
+    else:
+        problems.append(
+            f"{where}: unknown{did_you_mean(name, TARGETS)} (any order in M2, any size in n_5)"
+        )
+    return name
+
+
+def goal_from_dict(given: dict[str, Any] | None) -> Goal | None:
+    """Make a goal from what a checkpoint holds.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    if given is None:
+        return None
+    try:
+        return Goal(**given)
+    except TypeError as error:
+        raise InputError(f"goal: {error}") from None
