@@ -182,7 +182,7 @@ def wrong_number(value: Any, where: str) -> list[str]:
     return [] if np.isfinite(value) else [f"{where} = {value!r}: must be a finite number"]
 
 
-def _for_arrays(function: FunctionType) -> Callable[..., Any]:
+def _for_arrays(function: Callable[..., Any]) -> Callable[..., Any]:
     """Copy a function so that `math`, `min` and `max` work on arrays and intervals.
 
     The functions that it calls by a global name are copied likewise. A global that is given another
@@ -196,7 +196,7 @@ def _copied(function: FunctionType, _: tuple[int, ...]) -> Callable[..., Any]:
     return _copy(function, {})  # which holds the globals, so that their addresses stay theirs
 
 
-def _globals(function: FunctionType, done: dict[FunctionType, None]) -> Iterator[int]:
+def _globals(function: Any, done: dict[FunctionType, None]) -> Iterator[int]:
     """Addresses of the global values that a function reaches."""
     if function in done:
         return

@@ -207,6 +207,8 @@ def _simulate(
         f"simulated in {duration(float(ds.attrs['wall_seconds']))}"
         f" ({duration(float(ds.attrs['compile_seconds']))} of it compiling)"
     )
+    if case.run is not None and case.run.method == "auto":
+        say(f"method {ds.attrs['method']}: {ds.attrs['method_reason']}")
     stopper.patient = False
     stopper.check()
     return ds

@@ -163,19 +163,24 @@ def _empty(replicas: int, classes: int, bits: int, chunk: int, particles: int, w
         return np.zeros((replicas, columns), kind)
 
     return Work(
-        meta,
-        *(zeros(classes, np.int64) for _ in range(4)),
-        np.zeros((replicas, classes, stride), np.int32),
-        free,
-        zeros(chunks << chunk, np.int64 if wide else np.int32),
-        zeros(pairs, float),
-        zeros(pairs, float),
-        zeros(pairs, np.int32),
-        zeros(pairs, np.int32),
-        zeros(pairs, np.int32),
-        *(zeros(AHEAD, np.int64) for _ in range(2)),
-        np.arange(classes) >= 2 << bits,
-        *(np.full((classes, classes), np.nan) for _ in range(2)),
+        meta=meta,
+        number=zeros(classes, np.int64),
+        room=zeros(classes, np.int64),
+        flow=zeros(classes, np.int64),
+        before=zeros(classes, np.int64),
+        where=np.zeros((replicas, classes, stride), np.int32),
+        free=free,
+        pool=zeros(chunks << chunk, np.int64 if wide else np.int32),
+        weight=zeros(pairs, float),
+        share=zeros(pairs, float),
+        alias=zeros(pairs, np.int32),
+        classes=zeros(pairs, np.int32),
+        queue=zeros(pairs, np.int32),
+        one=zeros(AHEAD, np.int64),
+        two=zeros(AHEAD, np.int64),
+        listed=np.arange(classes) >= 2 << bits,
+        high=np.full((classes, classes), np.nan),
+        low=np.full((classes, classes), np.nan),
     )
 
 
