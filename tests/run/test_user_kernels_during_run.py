@@ -1,0 +1,168 @@
+"""What a user's kernel or rate gets wrong only where the run arrives, and what then happens."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+from typing import Any
+
+import pytest
+import runs
+
+import smolux as sx
+from smolux.errors import InputError
+from smolux.timefunction import TimeFunction
+
+every_method = pytest.mark.parametrize("method", runs.METHODS)
+#: few buckets: a table for the many that are usual would be a million calls from Python
+SETTINGS = {"inverse": sx.methods.Inverse(buckets=64)}
+#: a size that no sample of the checks at the start holds
+ODD = 21.0
+
+
+def odd(i: float, j: float, at: float = ODD, value: float = 1.0) -> float:
+    """Constant, but for pairs with one size; `value` above 8 stands for what is no number."""
+    if i == at or j == at:
+        if value == 9.0:
+            return math.nan
+        if value == 10.0:
+            return math.inf
+        return value
+    return 1.0
+
+
+def spike(t: float, low: float = 0.0, high: float = 0.0) -> float:
+    if abs(t - 0.32706) < 5e-5:  # narrower than the distance of the samples
+        return high
+    return low
+
+
+def rate(low: float, high: float) -> TimeFunction:
+    """The spike with values as data, so that all tests here need one loop a method."""
+    return replace(TimeFunction.of(spike), parameters=(low, high))
+
+
+def model(value: float, bounds: Any = None, low: float = 0.0, high: float = 0.0) -> sx.Model:
+    processes = [sx.processes.Aggregation(), sx.processes.Shattering(rate(low, high))]
+    return sx.Model(sx.kernels.from_function(odd, value=value, bounds=bounds), processes)
+
+
+def simulate(value: float, method: str, bounds: Any = None, **settings: Any) -> Any:
+    given = {"particles": 2000, "replicas": 2, "seed": 5, "sizes": 40}
+    chosen = SETTINGS.get(method, method)
+    return sx.simulate(model(value, bounds), [30.0], method=chosen, **given | settings)
+
+
+def warnings(ds: Any) -> list[str]:
+    return json.loads(ds.attrs["warnings"])
+
+
+def found_above(ds: Any) -> list[str]:
+    return [w for w in warnings(ds) if "above its bound" in w]
+
+
+def one(*box: float) -> tuple[float, float]:
+    return 1.0, 1.0
+
+
+def below_one(*box: float) -> tuple[float, float]:
+    return 0.0, 1.0
+
+
+def eight(*box: float) -> tuple[float, float]:
+    return 0.0, 8.0
+
+
+@pytest.mark.parametrize(("value", "text"), [(9.0, "nan"), (10.0, "inf"), (-1.0, "-1")])
+@every_method
+def test_no_rate(method: str, value: float, text: str) -> None:
+    # stated bounds: the values are seen by the method itself, whatever bounds are found
+    with pytest.raises(InputError) as caught:
+        simulate(value, method, eight)
+    (message,) = caught.value.problems
+    assert "'odd'" in message
+    assert f"gave {text} " in message
+    sizes = re.search(r"for the sizes (\d+) and (\d+)", message)
+    assert sizes is not None
+    assert 21 in map(int, sizes.groups())
+    met = re.search(r"met at t = ([\d.e+-]+);", message)
+    assert met is not None
+    assert 0.0 < float(met[1]) < 30.0
+
+
+@pytest.mark.parametrize("value", [9.0, 10.0, -1.0])
+@every_method
+def test_no_rate_where_bounds_are_sampled(method: str, value: float) -> None:
+    with pytest.raises(InputError) as caught:
+        simulate(value, method)
+    (message,) = caught.value.problems
+    assert re.search(r"sizes \d+ (and|to) \d+", message)
+    assert "t = " in message
+
+
+@every_method
+def test_a_size_that_is_never_reached_is_no_obstacle(method: str) -> None:
+    ds = simulate(9.0, method, eight, particles=20, population="none")
+    assert found_above(ds) == []
+
+
+@pytest.mark.parametrize("bounds", [below_one, one])
+@every_method
+def test_bounds_that_do_not_hold_are_repaired(
+    method: str, bounds: Any, request: pytest.FixtureRequest
+) -> None:
+    if method == "size-class" and bounds is one:
+        reason = "where both bounds are equal, the rate is not computed"
+        request.applymarker(pytest.mark.xfail(reason=reason, raises=ValueError, strict=True))
+    ds = simulate(8.0, method, bounds)
+    right = simulate(8.0, method, eight)
+    assert found_above(right) == []
+    if method == "inverse":  # needs no bounds
+        assert found_above(ds) == []
+        runs.assert_same(right, ds)
+        return
+    (warning,) = found_above(ds)
+    sizes = re.search(r"at the sizes (\d+) and (\d+)", warning)
+    assert sizes is not None
+    assert 21 in map(int, sizes.groups())
+    # repaired, not ignored: the many collisions of this size take place
+    a, b, plain = (float(x["n"].sel(size=21).mean()) for x in (ds, right, simulate(1.0, method)))
+    assert abs(a - b) < 0.5 * (plain - b) + 1e-12
+
+
+# --- rates of processes --------------------------------------------------------------------------
+
+
+def with_rate(low: float, high: float, method: str, end: float = 0.5, **settings: Any) -> Any:
+    given = {"particles": 200_000, "replicas": 2, "seed": 5, "sizes": 40}
+    chosen, times = SETTINGS.get(method, method), [0.4 * end, end]
+    return sx.simulate(model(1.0, one, low, high), times, method=chosen, **given | settings)
+
+
+@every_method
+def test_a_rate_above_its_sampled_bound_is_repaired(method: str) -> None:
+    ds = with_rate(1.0, 5.0, method)
+    (warning,) = [w for w in warnings(ds) if "above its sampled bound" in w]
+    assert "shattering" in warning
+    assert "spike" in warning
+    assert "of 2 replicas" in warning
+    runs.assert_same(ds, with_rate(1.0, 5.0, method, replicas=1))
+
+
+@every_method
+def test_a_rate_that_turns_negative_where_it_was_not_tried(method: str) -> None:
+    with pytest.raises(InputError) as caught:
+        with_rate(1.0, -1.0, method)
+    (message,) = caught.value.problems
+    assert "shattering, spike, is -1 at t = 0.32" in message
+    assert "zero or more" in message
+    # not if the run ends before
+    assert warnings(with_rate(1.0, -1.0, method, 0.2, particles=100, replicas=1)) == []
+
+
+def test_a_rate_that_is_seen_to_turn_negative() -> None:
+    with pytest.raises(InputError, match=r"is -0\.\d+ at t = 0\.\d+") as caught:
+        sx.simulate(runs.model("0.1 - t"), [0.2, 0.5], method=runs.METHODS[0])
+    assert "shattering" in str(caught.value)
