@@ -28,20 +28,22 @@ def model(kernel: Any, shattering: float = 0.0) -> sx.Model:
     return sx.Model(kernel=kernel, processes=processes)
 
 
-def group_of(physics: sx.Model, end: float, particles: int, method: str, seed: int = 1) -> Group:
-    """Prepare one replica, compiled, ready to run."""
+def group_of(
+    physics: sx.Model, end: float | Sequence[float], particles: int, method: str, seed: int = 1
+) -> Group:
+    """Prepare one replica, compiled, ready to run to one output time or through several."""
     plan = make_plan(
-        physics, [end], method, "number", "doubling", particles, 1, seed, (0, 1, 2), 1024, 4, False
+        physics, end, method, "number", "doubling", particles, 1, seed, (0, 1, 2), 1024, 4, False
     )
     group = Group.start(plan, 0, 1)
     group.compile()
     return group
 
 
-def loop_seconds(group: Group) -> float:
+def loop_seconds(group: Group, stop: Callable[[], bool] = lambda: False) -> float:
     """Processor seconds of the event loop; a shared machine disturbs them less than wall time."""
     start = time.thread_time()
-    group.advance(lambda: False)
+    group.advance(stop)
     return time.thread_time() - start
 
 
