@@ -139,13 +139,14 @@ def _with_method(plan: Plan) -> Plan:
     """Let the method be chosen."""
     initial, processes = plan.model.initial, plan.model.processes
     sizes, counts = initial.sample(min(plan.particles, 1000), 0.5)
-    mean = float(sizes @ counts) / float(counts.sum())
+    mass = float(sizes @ counts)
+    means = mass / float(counts.sum()), float(sizes.astype(float) ** 2 @ counts) / mass
     method, reason = choose(
         rates_for(plan.model, plan.weighting),
         processes,
         plan.particles,
         initial.total,
-        mean,
+        means,
         plan.times[-1],
     )
     return replace(plan, method=method, reason=reason)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 from ..processes.base import PairProcess
 from .acceptance_rejection import AcceptanceRejection
@@ -20,7 +21,7 @@ Float = NDArray[np.float64]
 #: relative growth of the mean size in a step of the estimate, and the most steps
 _GROWTH, _STEPS = 0.5, 60
 #: quantiles of the sizes for which the kernel is evaluated
-_QUANTILES = (np.arange(24) + 0.5) / 24
+_SHARES = (np.arange(16) + 0.5) / 16
 #: nanoseconds: a candidate of acceptance-rejection, and what an event costs besides; the same of
 #: the size-class method, whose tables of pairs cost more for few particles
 _TRIAL, _EVENT = 27.0, 35.0
@@ -35,24 +36,73 @@ class Auto(Method):
     title: ClassVar[str] = "chosen by an estimate of the cost"
 
 
-def _sizes(mean: float, shares: Any) -> Float:
-    """Quantiles of the geometric law, to which aggregation with a constant kernel leads."""
-    if mean <= 1.0:
-        return np.ones(np.shape(shares))
-    return np.maximum(np.ceil(np.log1p(-np.asarray(shares)) / math.log1p(-1.0 / mean)), 1.0)
+def _quantiles(mean: float, heavy: float, shares: Any, by_mass: bool = False) -> Float:
+    """Sizes of a gamma law with a mean, and a mean by mass; the self-similar laws are near one."""
+    excess = heavy / mean - 1.0
+    if excess < 1e-9:
+        return np.full(np.shape(shares), max(round(mean), 1), float)
+    shape = 1.0 / excess
+    found = special.gammaincinv(shape + by_mass, shares) * mean / shape
+    return np.maximum(np.round(found), 1.0)
 
 
-def _mean_rate(rates: Rates, mean: float) -> float:
-    k = _sizes(mean, _QUANTILES)
-    values = rates.arrays(k[:, None], k[None, :])
-    return float(np.mean(np.where(np.isfinite(values), values, 0.0)))
+def _changes(processes: Sequence[PairProcess], t: float, sizes: Float) -> tuple[Float, Float]:
+    """Return what an encounter of each pair of sizes adds to the number and to the second moment."""
+    n = len(sizes)
+    number, square = np.zeros((2, n, n))
+    for process in processes:
+        factor = float(process.factor(t))
+        out, counts = np.zeros((2, process.entries), np.int64)
+        for a in range(n):
+            for b in range(a, n):
+                i, j = int(sizes[a]), int(sizes[b])
+                made = process.outcome(i, j, out, counts)
+                new = [(float(k), float(c)) for k, c in zip(out[:made], counts[:made], strict=True)]
+                number[a, b] += factor * (sum(c for _, c in new) - 2.0)
+                square[a, b] += factor * (sum(c * k * k for k, c in new) - i * i - j * j)
+    upper = np.triu(np.ones((n, n)), 1)
+    return number + (number * upper).T, square + (square * upper).T
 
 
-def _gain(process: PairProcess, mean: float) -> int:
-    """Particles that an encounter of two particles of mean size adds."""
-    sizes, counts = np.zeros((2, process.entries), np.int64)
-    size = max(round(mean), 1)
-    return int(counts[: process.outcome(size, size, sizes, counts)].sum()) - 2
+def _course(
+    rates: Rates,
+    processes: Sequence[PairProcess],
+    density: float,
+    mean: float,
+    heavy: float,
+    end: float,
+) -> Float:
+    """Follow the mean sizes, by number and by mass: rows of both, the mean rate, and encounters.
+
+    The two moment equations, closed by a gamma law.
+    """
+    t, mass = 0.0, density * mean
+    course = []
+    for _ in range(_STEPS):
+        k = _quantiles(mean, heavy, _SHARES)
+        rate = _rates(rates, k)
+        gain = float((_changes(processes, t, k)[0] * rate).mean())
+        m = _quantiles(mean, heavy, _SHARES, by_mass=True)
+        by_mass = _rates(rates, m) / (m[:, None] * m)
+        spread = float((_changes(processes, t, m)[1] * by_mass).mean())
+        # relative changes of the number of particles and of the second moment
+        down, up = 0.5 * gain * mass / mean, 0.5 * spread * mass / heavy
+        fastest = max(abs(down), abs(up))
+        step = min(_GROWTH / fastest if fastest else math.inf, end - t)
+        total = sum(float(process.factor(t)) for process in processes)
+        met = 0.5 * float(rate.mean()) * mass / mean * total * step
+        course.append((mean, heavy, float(rate.mean()), met))
+        mean = max(mean * math.exp(-down * step), 1.0)
+        heavy = max(heavy * math.exp(up * step), mean)
+        t += step
+        if t >= end or heavy > 1e12:
+            break
+    return np.array(course)
+
+
+def _rates(rates: Rates, sizes: Float) -> Float:
+    values = rates.arrays(sizes[:, None], sizes[None, :])
+    return np.where(np.isfinite(values), values, 0.0)
 
 
 def candidates_per_event(
@@ -60,36 +110,30 @@ def candidates_per_event(
     processes: Sequence[PairProcess],
     particles: int,
     density: float,
-    mean: float,
+    sizes: tuple[float, float],
     end: float,
 ) -> float:
     """Estimate the candidates that acceptance-rejection needs for an event, up to the time `end`.
 
-    Sizes are taken for geometrically distributed, with the mean that the rate equation of their
-    number gives.
+    Parameters
+    ----------
+    rates, processes, particles, density, end
+        As for `choose`.
+    sizes : tuple of float
+        Mean sizes at the start, by number and by mass.
     """
-    t, mass = 0.0, density * mean
-    course = []
-    for _ in range(_STEPS):
-        rate, number = _mean_rate(rates, mean), mass / mean
-        factors = [float(process.factor(t)) for process in processes]
-        gains = [_gain(process, mean) for process in processes]
-        loss = -0.5 * rate * number * sum(f * g for f, g in zip(factors, gains, strict=True))
-        step = min(_GROWTH / abs(loss) if loss else math.inf, end - t)
-        course.append((mean, rate, 0.5 * rate * number * sum(factors) * step))
-        mean = max(mean * (1.0 + loss * step), 1.0)
-        t += step
-        if t >= end or mean > 1e15:
-            break
-    means, average, events = np.array(course).T
-    largest = np.array([float(_sizes(m, 1.0 - 1.0 / max(particles, 2))) for m in means])
-    one = np.ones(len(means))
-    bound = rates.bounds(one, largest, one, largest)[1]  # in one call: proofs are dear
-    if not events.any():
+    mean, heavy, average, met = _course(rates, processes, density, *sizes, end).T
+    if not met.any():
         return 1.0
+    last = 1.0 - 1.0 / max(particles, 2)
+    largest = np.array([_quantiles(m, h, last) for m, h in zip(mean, heavy, strict=True)])
+    largest = np.minimum(largest, particles * mean)
+    one = np.ones(len(mean))
+    bound = rates.bounds(one, largest, one, largest)[1]  # in one call: proofs are dear
     with np.errstate(all="ignore"):
-        candidates = np.where(events > 0.0, np.maximum(bound / average, 1.0), 0.0)
-    found = float(candidates @ events / events.sum())
+        candidates = np.where(met > 0.0, np.maximum(bound / average, 1.0), 0.0)
+    # encounters are weighed by their number for each particle present
+    found = float(candidates @ met / met.sum())
     return found if math.isfinite(found) else math.inf
 
 
@@ -98,7 +142,7 @@ def choose(
     processes: Sequence[PairProcess],
     particles: int,
     density: float,
-    mean: float,
+    sizes: tuple[float, float],
     end: float,
 ) -> tuple[Method, str]:
     """Choose a method and say why.
@@ -110,8 +154,10 @@ def choose(
     processes : sequence of PairProcess
     particles : int
         Simulated particles at the start.
-    density, mean : float
-        Number density and mean size at the start.
+    density : float
+        Number density at the start.
+    sizes : tuple of float
+        Mean sizes at the start, by number and by mass.
     end : float
         Last output time.
 
@@ -120,7 +166,7 @@ def choose(
     method : Method
     reason : str
     """
-    candidates = candidates_per_event(rates, processes, particles, density, mean, end)
+    candidates = candidates_per_event(rates, processes, particles, density, sizes, end)
     plain = _EVENT + _TRIAL * candidates
     classes = _CLASS_EVENT + _CLASS_FEW / particles
     estimate = "more than a million" if candidates > 1e6 else f"about {candidates:.2g}"

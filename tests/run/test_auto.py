@@ -1,0 +1,68 @@
+"""The choice of a method."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import smolux as sx
+from smolux.assembly import rates_for
+from smolux.methods.auto import candidates_per_event, choose
+from smolux.weighting import Number
+
+AGGREGATION = [sx.processes.Aggregation()]
+
+
+def estimate(kernel: Any, particles: int, end: float, processes: Any = AGGREGATION) -> float:
+    rates = rates_for(sx.Model(kernel, processes), Number())
+    return candidates_per_event(rates, processes, particles, 1.0, (1.0, 1.0), end)
+
+
+def test_a_constant_kernel_is_never_rejected() -> None:
+    assert estimate(sx.kernels.Constant(), 10_000, 100.0) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("kernel", "particles", "end"),
+    [(sx.kernels.Ballistic(), 20_000, 20.0), (sx.kernels.Additive(), 5_000, 1.0)],
+)
+def test_the_estimate_is_near_what_a_run_needs(kernel: Any, particles: int, end: float) -> None:
+    from smolux.plan import make_plan
+    from smolux.replicas import Group
+
+    plan = make_plan(
+        sx.Model(kernel), [end], "acceptance-rejection", "number", "doubling", particles, 2, 1,
+        (0,), 16, 4, False,
+    )  # fmt: skip
+    group = Group.start(plan, 0, 2)
+    group.advance(lambda: False)
+    from smolux.core.state import EVENTS, TRIALS
+
+    needed = group.state.count[:, TRIALS].sum() / group.state.count[:, EVENTS].sum()
+    assert estimate(kernel, particles, end) == pytest.approx(needed, rel=0.6)
+
+
+def test_what_is_chosen_and_why_stands_in_the_result() -> None:
+    ds = sx.simulate(sx.Model(sx.kernels.Constant()), [1.0], particles=1000, replicas=2, seed=1)
+    assert ds.attrs["method"] == "acceptance-rejection"
+    assert "candidates an event" in ds.attrs["method_reason"]
+    given = sx.simulate(
+        sx.Model(sx.kernels.Constant()), [1.0], particles=1000, replicas=2, seed=1,
+        method="acceptance-rejection",
+    )  # fmt: skip
+    assert given.attrs["method_reason"] == "asked for"
+    np.testing.assert_array_equal(ds["n"], given["n"])
+
+
+def test_kernels_far_below_their_bound_are_not_left_to_rejection() -> None:
+    for kernel in (sx.kernels.GeneralizedBrownian(0.95), sx.kernels.Multiplicative()):
+        rates = rates_for(sx.Model(kernel, AGGREGATION), Number())
+        method, reason = choose(rates, AGGREGATION, 100_000, 1.0, (1.0, 1.0), 100.0)
+        assert method.name == "size-class", reason
+
+
+def test_shattering_and_rates_that_fade_are_followed() -> None:
+    fading = [sx.processes.Aggregation(), sx.processes.Shattering("0.1*max(0, 1 - t/5)")]
+    assert 1.0 < estimate(sx.kernels.Ballistic(), 10_000, 50.0, fading) < 50.0

@@ -1,0 +1,96 @@
+"""The size-class method where its store and its classes are strained."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import smolux as sx
+from smolux.methods.size_class import SizeClass
+
+#: one law for many kernels: far from low rank, a narrow ridge, with zeros, gelling
+LAW = "a*abs(i - j) + b*exp(-((i - j)/w)**2) + c*(i*j)**m"
+
+
+def kernel(a: float = 0.0, b: float = 0.0, w: float = 1.0, c: float = 0.0, m: float = 0.0) -> Any:
+    return sx.kernels.formula(LAW, a=a, b=b, w=w, c=c, m=m)
+
+
+def model(law: Any, shattering: float = 0.0, initial: Any = None) -> sx.Model:
+    processes = [sx.processes.Aggregation(), sx.processes.Shattering(shattering)]
+    return sx.Model(law, processes, initial or sx.initial.monodisperse())
+
+
+KERNELS = {
+    "difference": kernel(a=1.0, b=0.1, w=0.5),
+    "difference with zeros": kernel(a=1.0),
+    "ridge": kernel(b=1.0, w=0.3, c=0.01),
+    "nearly gelling": kernel(c=1.0, m=0.5),
+}
+
+
+@pytest.mark.parametrize("name", KERNELS)
+@pytest.mark.parametrize("classes", [1, 4, 16])
+def test_kernels_far_from_low_rank_follow_the_rate_equations(name: str, classes: int) -> None:
+    initial = sx.initial.from_sizes({1: 0.5, 2: 0.3, 20: 0.2})
+    case = model(KERNELS[name], 0.05, initial)
+    ds = sx.simulate(
+        case, [0.1, 0.3], method=SizeClass(classes), particles=20_000, replicas=12, seed=5
+    )
+    exact = sx.solve(case, [0.1, 0.3])
+    for order in (0, 2):
+        found = ds["moment"].sel(order=order).values
+        error = found.std(axis=0, ddof=1) / np.sqrt(len(found))
+        deviation = found.mean(axis=0) - exact["moment"].sel(order=order).values[0]
+        assert np.abs(deviation / error).max() < 5.5  # Student, 11 degrees of freedom: 2e-4
+    mass = ds["moment"].sel(order=1).values * ds["volume"].values
+    assert (mass == np.rint(mass)).all()
+
+
+@pytest.mark.parametrize("particles", [2, 3, 17, 1000])
+def test_few_particles_end_as_one_cluster(particles: int) -> None:
+    ds = sx.simulate(
+        model(kernel(c=1.0)), [1e6], method="size-class", particles=particles, replicas=3, seed=1,
+        population="fixed-volume",
+    )  # fmt: skip
+    assert (ds["particles"].values == 1).all()
+    assert (ds["largest"].values == particles).all()
+    assert (ds["collisions"].values == particles - 1).all()
+
+
+def test_sizes_beyond_32_bits_and_beyond_the_classes_of_the_start() -> None:
+    times = [1e3, 1e9, 1e12]
+    ds = sx.simulate(model(kernel(c=1.0)), times, method="size-class", particles=400, replicas=8,
+                     seed=2)  # fmt: skip
+    clusters = ds["number_density"].values * np.array(times)
+    error = clusters.std(axis=0, ddof=1) / np.sqrt(8)
+    assert (np.abs(clusters.mean(axis=0) - 2.0 / (1.0 + 2.0 / np.array(times))) < 7 * error).all()
+    assert ds["largest"].values[:, -1].min() > 1 << 40
+    assert ds["moment"].sel(order=1).values == pytest.approx(1.0, abs=0.0)
+
+
+def test_shattering_fills_the_lists_beyond_their_start() -> None:
+    case = model(kernel(c=1.0), 0.02, sx.initial.from_sizes({500: 1.0}))
+    ds = sx.simulate(case, [0.5, 5.0], method="size-class", particles=300, replicas=16, seed=3,
+                     distribution=True)  # fmt: skip
+    assert ds["particles"].values.max() > 5_000
+    assert (ds["moment"].sel(order=1).values == 500.0).all()
+    # N' = 500 * 0.02 N - (1/2 + 0.02) N**2, whatever the sizes are
+    exact = 1.0 / (0.052 + (1.0 - 0.052) * np.exp(-10.0 * np.array([0.5, 5.0])))
+    found = ds["number_density"].values
+    error = found.std(axis=0, ddof=1) / np.sqrt(len(found))
+    assert (np.abs(found.mean(axis=0) - exact) < 5 * error).all()
+
+
+def test_the_number_of_classes_is_checked() -> None:
+    with pytest.raises(sx.errors.InputError, match="classes = 3: must be 1, 2, 4"):
+        SizeClass(3)
+
+
+def test_a_kernel_without_a_bound_is_named() -> None:
+    law = sx.kernels.formula("1/(c - i*j)", c=4e12)  # infinite for sizes of two million
+    case = model(law, initial=sx.initial.from_sizes({1_000_000: 1.0}))
+    with pytest.raises(sx.errors.InputError, match="no finite bound for the sizes"):
+        sx.simulate(case, [1e15], method="size-class", particles=100, replicas=1, seed=1)
