@@ -47,7 +47,7 @@ def _quantiles(mean: float, heavy: float, shares: Any, by_mass: bool = False) ->
 
 
 def _changes(processes: Sequence[PairProcess], t: float, sizes: Float) -> tuple[Float, Float]:
-    """Return what an encounter of each pair of sizes adds to the number and to the second moment."""
+    """Return what an encounter of each pair of sizes adds to the number and the second moment."""
     n = len(sizes)
     number, square = np.zeros((2, n, n))
     for process in processes:
