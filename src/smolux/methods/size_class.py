@@ -73,7 +73,7 @@ class SizeClass(Method):
         replicas = len(populations)
         total = np.array([counts.sum() for _, counts in populations])
         bits = self._bits(int(total.max()))
-        chunk = int(np.clip(int(total.max()).bit_length() - 12, 4, 12))
+        chunk = _chunk(int(total.max()))
         largest = max(int(sizes[-1]) for sizes, _ in populations)
         top = min(max(mass, largest, 16).bit_length(), 61)
         block = _OCTAVES << bits
@@ -140,7 +140,16 @@ class SizeClass(Method):
 
     def bytes_per_replica(self, particles: int) -> int:
         """See `Method.bytes_per_replica`."""
-        return 4 * particles + 40_000
+        # as for monomers: four bytes a particle, and what grows with the classes
+        bits, chunk = self._bits(particles), _chunk(particles)
+        classes = _class_of(2 * particles, bits) + (_OCTAVES << bits)
+        lists = 4 * classes * ((particles >> chunk) + 2)
+        return 4 * particles + lists + 14 * classes**2 + (4 * classes << chunk)
+
+
+def _chunk(particles: int) -> int:
+    """Bits of the entries of a chunk: there should be some thousand chunks, of 16 to 4096."""
+    return int(np.clip(particles.bit_length() - 12, 4, 12))
 
 
 def _class_of(size: int, bits: int) -> int:
