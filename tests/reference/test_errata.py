@@ -1,8 +1,8 @@
-"""Every claim of docs/errata.md about the paper of Kalinov et al., executed.
+"""Every claim of docs/errata.md, executed. The tests bear the numbers of the entries.
 
 A. Kalinov, A. I. Osinskiy, S. A. Matveev, W. Otieno, N. V. Brilliantov, Direct simulation Monte
-Carlo for new regimes in aggregation-fragmentation kinetics. The tests bear the numbers of the
-entries.
+Carlo for new regimes in aggregation-fragmentation kinetics; A. I. Osinsky, Low-rank Monte Carlo for
+Smoluchowski-class equations.
 """
 
 from __future__ import annotations
@@ -413,3 +413,75 @@ class TestSmallOnes:
         np.testing.assert_allclose(solution.densities(10.0, k), n, rtol=1e-9)
         steady = solution.densities(math.inf, k)
         assert (n / steady).max() > 3  # the steady state is far at t = 10
+
+
+class TestLowRankAcceptance:
+    """Entry 13: equation (21) is inverted."""
+
+    def test_range(self) -> None:
+        i = np.arange(1.0, 301)
+        x, y = 1 / i[:, None], 1 / i
+        radii = (i[:, None] ** (1 / 3) + i ** (1 / 3)) ** 2
+        bound = radii * np.sqrt(x)  # (25)
+        share = ballistic(i[:, None], i) / (bound + bound.T)
+        np.testing.assert_allclose(share, np.sqrt(x + y) / (np.sqrt(x) + np.sqrt(y)), rtol=1e-12)
+        assert share.min() == pytest.approx(math.sqrt(0.5), rel=1e-12)
+        assert share.max() == pytest.approx(0.9469, abs=1e-4)
+        printed = (np.sqrt(x) + np.sqrt(y)) / np.sqrt(x + y)
+        assert printed.min() > 1.05
+
+
+class TestLowRankClock:
+    """Entry 14: line 12 of the algorithm advances the clock by twice too much."""
+
+    @staticmethod
+    def clusters(factor: float, rng: random.Random, n0: int = 100, end: float = 1.0) -> int:
+        """Run the algorithm for K = i + j with A = i; steps of mean ``factor V / sum(A)``."""
+        sizes, t = [1] * n0, 0.0
+        while True:
+            t += rng.expovariate(n0 * len(sizes) / (factor * n0))  # sum(A) = mass times number
+            if t > end:
+                return len(sizes)
+            i = rng.choices(range(len(sizes)), sizes)[0]
+            j = rng.randrange(len(sizes))
+            if i != j:  # C / (A + A^T) = 1
+                sizes[i] += sizes[j]
+                sizes[j] = sizes[-1]
+                sizes.pop()
+
+    @pytest.mark.parametrize(("factor", "left"), [(1.0, 37.42), (2.0, 61.05)])
+    def test_clusters_left(self, factor: float, left: float) -> None:
+        assert 1 + 99 * math.exp(-1 / factor) == pytest.approx(left, abs=0.01)
+        rng = random.Random(7)
+        runs = [self.clusters(factor, rng) for _ in range(300)]
+        assert np.mean(runs) == pytest.approx(left, abs=4 * np.std(runs) / math.sqrt(300))
+
+    def test_sums(self) -> None:
+        number = np.array([5.0, 3.0, 0.0, 2.0])
+        i = np.arange(1.0, 5)
+        bound = np.broadcast_to(i[:, None], (4, 4))
+        rate = number @ (i[:, None] + i) @ number / 2  # (8), equal particles included
+        assert number @ bound @ number == rate
+
+
+class TestLowRankDoubling:
+    """Entry 15: doubling the number and the volume is not enough."""
+
+    def test_rate_per_volume(self) -> None:
+        number, volume = np.array([4.0, 2.0, 2.0]), 8.0
+
+        def rate(number: Float, volume: float) -> float:
+            return float(number @ np.ones((3, 3)) @ number / (2 * volume**2))
+
+        assert rate(2 * number, 2 * volume) == rate(number, volume)
+        assert rate(number, 2 * volume) == rate(number, volume) / 4
+
+
+class TestPairsWithItself:
+    """Entry 16: the sums (6) and (8) count each particle with itself."""
+
+    def test_eight_particles(self) -> None:
+        number = np.array([4.0, 2.0, 2.0])
+        pairs = number[:, None] * number
+        assert pairs.sum() / 2 == 32
+        assert (pairs - np.diag(number)).sum() / 2 == math.comb(8, 2)
