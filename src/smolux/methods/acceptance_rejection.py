@@ -284,7 +284,7 @@ class AcceptanceRejection(Method):
         return work._replace(sizes=enlarged(work.sizes, 2 * work.sizes.shape[1]))
 
     def supply_bound(self, work: Work, rates: Rates, state: State, replica: int) -> None:
-        """See `Method.supply_bound`; bounds for half an octave are computed together.
+        """See `Method.supply_bound`; bounds for two octaves are computed together.
 
         They come in fixed blocks: a bound must not depend on which replica asked first.
         """
@@ -292,8 +292,8 @@ class AcceptanceRejection(Method):
         low, high = (int(level_of.py_func(work.edges, count[k])) for k in (SMALLEST, LARGEST))
         if not np.isnan(work.majorant[low, high]):  # another replica has asked for it
             return
-        block = high - high % 4
-        highs = np.arange(max(low, block), min(block + 4, work.majorant.shape[1]))
+        block = high - high % 16
+        highs = np.arange(max(low, block), min(block + 16, work.majorant.shape[1]))
         top = (work.edges[highs + 1] - 1).astype(float)
         bottom = np.full(top.shape, float(work.edges[low]))
         bound = rates.bounds(bottom, top, bottom, top)[1]
