@@ -17,8 +17,10 @@ _LAZY = {
     "simulate": "smolux.stochastic",
     "resume": "smolux.stochastic",
     "solve": "smolux.deterministic",
+    "sweep": "smolux.sweeps",
     "summary": "smolux.analysis",
     "InputError": "smolux.errors",
+    "WorkerError": "smolux.errors",
     "Interrupted": "smolux.errors",
     "SmoluxWarning": "smolux.errors",
     **dict.fromkeys(
@@ -43,6 +45,7 @@ __all__ = [
     "Interrupted",
     "Model",
     "SmoluxWarning",
+    "WorkerError",
     "__version__",
     "analysis",
     "exact",
@@ -57,6 +60,7 @@ __all__ = [
     "simulate",
     "solve",
     "summary",
+    "sweep",
     "weighting",
 ]
 
@@ -75,9 +79,10 @@ if TYPE_CHECKING:
     from . import plotting as plot
     from .analysis.summary import summary
     from .deterministic.solver import solve
-    from .errors import InputError, Interrupted, SmoluxWarning
+    from .errors import InputError, Interrupted, SmoluxWarning, WorkerError
     from .model import Model
     from .stochastic import resume, simulate
+    from .sweeps import sweep
 
 
 def __getattr__(name: str) -> Any:

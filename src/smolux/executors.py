@@ -165,13 +165,13 @@ def _renewed(pool: Executor, given: Executor) -> Executor:
 
 @contextmanager
 def opened(
-    kind: str, workers: int | None = None, address: str | None = None
+    executor: str, workers: int | None = None, address: str | None = None
 ) -> Iterator[Executor | None]:
     """Open an executor by its name in case files.
 
     Parameters
     ----------
-    kind : {"threads", "processes", "dask", "mpi"}
+    executor : {"threads", "processes", "dask", "mpi"}
     workers : int, optional
         How many; as many as there are cores, or as MPI or the cluster has.
     address : str, optional
@@ -187,19 +187,19 @@ def opened(
     InputError
         If what it needs is not installed, or cannot be reached.
     """
-    if kind == "threads":
+    if executor == "threads":
         if workers is None:
             yield None
             return
         with ThreadPoolExecutor(workers) as threads:
             yield threads
-    elif kind == "processes":
+    elif executor == "processes":
         from multiprocessing import get_context
 
         # fresh processes: copies of one with threads may never get going
         with ProcessPoolExecutor(workers or cores(), get_context("spawn"), _ignore_ctrl_c) as pool:
             yield pool
-    elif kind == "dask":
+    elif executor == "dask":
         with _dask(workers, address) as client:
             yield adapted(client)
     else:

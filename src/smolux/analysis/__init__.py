@@ -1,6 +1,7 @@
 """What results say: means and intervals, agreement, oscillations, gelation, scaling."""
 
 from .compare import compare
+from .gathering import format_sweep, sweep_table
 from .gelation import gel_fraction, gelation
 from .moments import moments
 from .oscillations import extrema, oscillations
@@ -14,6 +15,7 @@ __all__ = [
     "compare",
     "exact_dataset",
     "extrema",
+    "format_sweep",
     "format_table",
     "gel_fraction",
     "gelation",
@@ -24,5 +26,6 @@ __all__ = [
     "scaling",
     "series",
     "summary",
+    "sweep_table",
     "tables",
 ]

@@ -54,6 +54,10 @@ def series(
             shown = present if len(present) <= 12 else f"{present[0]} to {present[-1]}"
             raise InputError(f"{dim} = {wanted!r}: not in the result, which has {shown}")
         values = values.sel({dim: wanted}, drop=True)
+    others = [str(d) for d in values.dims if d not in ("replica", "time")]
+    if others:
+        place = {name: values[name].values[0].item() for name in others}
+        raise InputError(f"ds: is a sweep; choose a point, such as ds.sel({place})")
     return values.transpose("replica", "time")
 
 

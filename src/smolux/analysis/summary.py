@@ -136,6 +136,9 @@ def summary(ds: xr.Dataset, sizes: Sequence[int] = (1, 2, 5, 10, 20, 50, 100)) -
         raise InputError(
             f"ds: is no result of simulate or solve, it has no {', '.join(missing) or 'replica'}"
         )
+    if "sweep" in ds.attrs and "point_status" in ds and ds["point_status"].dims:
+        place = {str(d): ds[d].values[0].item() for d in ds["point_status"].dims}
+        raise InputError(f"ds: is a sweep; choose a point, such as ds.sel({place})")
     ds = ds.sel(size=[s for s in sizes if s in ds["size"].values])
     exact = exact_dataset(ds)
     result = xr.Dataset(

@@ -33,7 +33,7 @@ from .settings import (
 )
 from .write import to_toml
 
-__all__ = ["Case", "Output", "Parallel", "Run", "Solve", "load", "parse"]
+__all__ = ["Case", "Output", "Parallel", "Run", "Solve", "load", "parse", "read_value"]
 
 _TABLES = ("kernel", "processes", "initial", "run", "solve", "parallel", "output")
 
@@ -245,7 +245,7 @@ def _change(content: dict[str, Any], option: str, problems: Problems) -> None:
     if path == () and last in _TABLES:
         problems.add((last,), f"{last} is a table; set one of its keys: {last}.key={text}")
         return
-    table[last] = _value(text.strip())
+    table[last] = read_value(text.strip())
 
 
 def _step(table: Any, part: str) -> str | int | None:
@@ -260,7 +260,7 @@ def _step(table: Any, part: str) -> str | int | None:
     return None
 
 
-def _value(text: str) -> Any:
+def read_value(text: str) -> Any:
     """Read a value as TOML, or as a text if it is none: quotes get lost in a shell."""
     try:
         return tomllib.loads(f"x = {text}")["x"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from itertools import pairwise
 from typing import Any
 
@@ -48,6 +48,12 @@ class Run:
     target: str = "number_density"
     max_replicas: int = 1000
 
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments of `smolux.simulate` that decide on the data."""
+        return {
+            k: v for k, v in asdict(self).items() if k not in ("checkpoint_every", "time_limit")
+        }
+
 
 @dataclass(frozen=True)
 class Parallel:
@@ -71,6 +77,10 @@ class Solve:
     largest: int | None = None
     max_size: int | None = None
     gel: str = "inert"
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments of `smolux.solve`."""
+        return {k: v for k, v in asdict(self).items() if v is not None}
 
 
 @dataclass(frozen=True)

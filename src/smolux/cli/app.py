@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from . import check, compare, demo, kernels, new, plot, run, show, verify
+from . import check, compare, demo, kernels, new, plot, run, show, sweep, verify
 from .guard import Commands
 
 app = typer.Typer(
@@ -50,6 +50,7 @@ app.command()(demo.demo)
 app.command()(new.new)
 app.command()(check.check)
 app.command()(run.run)
+app.command()(sweep.sweep)
 app.command()(show.show)
 app.command()(plot.plot)
 app.command()(compare.compare)

@@ -45,7 +45,7 @@ class Display:
         Called each time; may raise to stop the run.
     terminal : bool, optional
         Whether there is a terminal for a bar; found out if left out.
-    what : {"simulating", "solving"}
+    what : {"simulating", "solving", "sweeping"}
         What is done, for the bar.
     every : float
         Seconds between two lines where there is no terminal.
@@ -63,7 +63,7 @@ class Display:
     ) -> None:
         self.terminal = sys.stderr.isatty() if terminal is None else terminal
         self.check, self.what, self.every, self.clock = check, what, every, clock
-        self.unit = "events" if what == "simulating" else "steps"
+        self.unit = "steps" if what == "solving" else "events"
         self.last: Progress | None = None
         self._due = 0.0
         self._bar: Any = None
@@ -141,7 +141,12 @@ def left(progress: Progress) -> str:
 
 
 def error(progress: Progress) -> str:
-    """Write how near a target error is: ``"±0.31 % of ±0.1 %, 16 replicas"``; often nothing."""
+    """Write how near a target error is: ``"±0.31 % of ±0.1 %, 16 replicas"``; often nothing.
+
+    Of a sweep, how many of its points are done.
+    """
+    if hasattr(progress, "note"):
+        return str(progress.note)
     reached, wanted = (getattr(progress, k, math.nan) for k in ("error", "target_error"))
     if not (math.isfinite(reached) and math.isfinite(wanted)):
         return ""

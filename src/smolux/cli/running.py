@@ -150,7 +150,9 @@ _CHANGED = (
 
 def _data(case: Case, settings: str) -> dict[str, Any]:
     """Return the settings that decide on the data."""
-    return asdict(case.solve) if settings == "solve" and case.solve else _arguments(case)
+    if settings == "solve" and case.solve is not None:
+        return asdict(case.solve)
+    return {} if case.run is None else case.run.arguments()
 
 
 def _check_plan(plan: Any, case: Case) -> None:
@@ -161,18 +163,20 @@ def _check_plan(plan: Any, case: Case) -> None:
     InputError
         If it does not.
     """
-    goal = plan.goal
+    goal, run = plan.goal, case.run
+    if run is None:
+        raise InputError(_CHANGED)
     begun = {
         "seed": plan.entropy,
         "method": "auto" if plan.reason else plan.method.name,
         "replicas": plan.replicas if goal is None else goal.first,
         "target_error": None if goal is None else goal.error,
         # without a goal they say nothing
-        "target": case.run.target if goal is None and case.run else goal and goal.target,
-        "max_replicas": case.run.max_replicas if goal is None and case.run else goal and goal.most,
+        "target": run.target if goal is None else goal.target,
+        "max_replicas": run.max_replicas if goal is None else goal.most,
     }
     same = model_to_dict(plan.model) == model_to_dict(case.model)
-    for name, value in _arguments(case).items():
+    for name, value in run.arguments().items():
         found = begun[name] if name in begun else getattr(plan, name)
         same = same and getattr(found, "name", found) == value
     if not same:
@@ -220,7 +224,7 @@ def _computed(case: Case, directory: RunDirectory, progress: Display) -> Any:
     with opened(**asdict(case.parallel)) as executor:
         if case.parallel.executor != "threads" and not file.is_file():
             return smolux.simulate(
-                case.model, executor=executor, progress=progress, **_arguments(case)
+                case.model, executor=executor, progress=progress, **run.arguments()
             )
         settings: dict[str, Any] = {
             "executor": executor if case.parallel.executor == "threads" else None,
@@ -230,18 +234,12 @@ def _computed(case: Case, directory: RunDirectory, progress: Display) -> Any:
         }
         if file.is_file():
             return smolux.resume(file, **settings)
-        return smolux.simulate(case.model, checkpoint=file, **_arguments(case), **settings)
-
-
-def _arguments(case: Case) -> dict[str, Any]:
-    """Return the arguments of `smolux.simulate` that decide on the data."""
-    settings = asdict(case.run)  # type: ignore[arg-type]
-    return {k: v for k, v in settings.items() if k not in ("checkpoint_every", "time_limit")}
+        return smolux.simulate(case.model, checkpoint=file, **run.arguments(), **settings)
 
 
 def _solve(case: Case, file: Path, display: Callable[..., Display]) -> Any:
     assert case.solve is not None
-    settings = {k: v for k, v in asdict(case.solve).items() if v is not None}
+    settings = case.solve.arguments()
     if case.run is not None:
         settings |= {
             "orders": case.run.orders,

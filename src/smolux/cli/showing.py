@@ -66,6 +66,8 @@ def text(ds: Any, most: int = MOST) -> str:
         Output times shown; if there are more, some of them, the first and the last included.
     """
     attributes = ds.attrs
+    if "sweep" in attributes:
+        return "\n".join([analysis.format_sweep(ds), *(f"warning: {w}" for w in warnings(ds))])
     facts = [str(attributes.get("method", "?"))]
     if "initial_particles" in attributes:
         facts += [

@@ -1,0 +1,9 @@
+"""Sweeps: a case at every point of a grid of its parameters, kept point by point."""
+
+from __future__ import annotations
+
+from .grid import SweepProgress, go_on, sweep
+from .over import Axis, read_axes
+from .points import Folder, Point, Sweep
+
+__all__ = ["Axis", "Folder", "Point", "Sweep", "SweepProgress", "go_on", "read_axes", "sweep"]
