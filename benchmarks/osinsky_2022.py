@@ -153,7 +153,8 @@ def measure(
         for method in METHODS[: _REPEATED if repeat else None]:
             times = [row.t for row in rows[: last[method]]]
             if times:
-                runs[method].append(course(kernel, times, particles, method))
+                most = math.inf if method in METHODS[:_REPEATED] else longest
+                runs[method].append(course(kernel, times, particles, method, most))
                 text = ", ".join(f"{r.seconds:.3g}" for r in runs[method][-1])
                 print(f"{kernel.name}, {method}: {text} s", flush=True)
     return {method: _median(found) for method, found in runs.items()}, guess, small
@@ -167,10 +168,11 @@ def _median(runs: list[list[Reached]]) -> list[Reached]:
     ]
 
 
-def _seconds(found: list[Reached], guess: list[float], k: int) -> str:
+def _seconds(found: list[Reached], guess: list[float], longest: float, k: int) -> str:
     if k < len(found):
         return f"{found[k].seconds:.3g}"
-    return f"(> {guess[k]:.2g})" if math.isfinite(guess[k]) else "–"
+    # a run that was begun has been stopped at the limit
+    return f"(> {max(guess[k], longest):.2g})" if math.isfinite(guess[k]) else "–"
 
 
 def _ns(found: list[Reached], k: int) -> str:
@@ -205,7 +207,10 @@ def report(number: int, particles: int, repeats: int, longest: float) -> list[st
         costs.append(
             [
                 f"{row.t:g}",
-                *(f"{_seconds(found[m], guess[m], k)} / {_ns(found[m], k)}" for m in METHODS),
+                *(
+                    f"{_seconds(found[m], guess[m], longest, k)} / {_ns(found[m], k)}"
+                    for m in METHODS
+                ),
                 *(_paper(row, m) for m in METHODS[1:]),
                 f"{(low.seconds / low.events) / (classes.seconds / classes.events):.1f}",
             ]
@@ -215,9 +220,10 @@ def report(number: int, particles: int, repeats: int, longest: float) -> list[st
     return [
         f"Monomers, N = {particles:.0e}, volume doubled. Processor seconds of one core up to t / "
         f"nanoseconds per collision; medians of {repeats} interleaved runs of size-class and "
-        f"low-rank, one run of the others. In brackets: not run, as it would take longer than "
-        f"{longest:g} s by the cost at N = {small:.0e}; –: not even that system came to it in "
-        f"{_TRYING:g} s. The paper's seconds are for N = 1e7 on its hardware.",
+        f"low-rank, one run of the others. In brackets: stopped after {longest:g} s, or not "
+        f"run, as it would take longer by the cost at N = {small:.0e}, which is a low estimate; "
+        f"–: not even that system came to it in {_TRYING:g} s. "
+        "The paper's seconds are for N = 1e7 on its hardware.",
         "",
         *table(head, costs),
         "",
