@@ -32,14 +32,14 @@ KERNELS: tuple[tuple[Any, float, float], ...] = (
     (sx.kernels.Constant(), 1.0, 1000.0),
     (sx.kernels.Additive(), 0.5, 3.0),
     (sx.kernels.Multiplicative(), 0.3, 0.9),
-    (sx.kernels.Brownian(), 1.0, 1000.0),
-    (sx.kernels.Ballistic(), 0.5, 100.0),
+    (sx.kernels.Brownian(), 1.0, 300.0),
+    (sx.kernels.Ballistic(), 0.5, 30.0),
     (sx.kernels.GeneralizedBrownian(a=0.95), 1.0, 60.0),
 )
 SIZES = (1000, 10_000, 100_000, 1_000_000)
 SHATTERING = (0.0, 0.01)
 #: a method this many times slower than the size-class method is stopped
-_HOPELESS = 6.0
+_HOPELESS = 3.0
 _GOAL = 1.3
 
 

@@ -245,7 +245,28 @@ def report(number: int, particles: int, repeats: int, longest: float) -> list[st
         ),
         "",
         _growth(found),
+        "",
+        *_targets(rows, found),
     ]
+
+
+def _targets(rows: Sequence[Row], found: dict[str, list[Reached]]) -> list[str]:
+    """Hold the results against what is wanted."""
+    classes, low = ([1e9 * r.seconds / r.events for r in found[m]] for m in METHODS[:_REPEATED])
+    worst = max(
+        ours / (1e9 * row.low_rank / row.collisions) for ours, row in zip(low, rows, strict=True)
+    )
+    told = [
+        ("low-rank : size-class at the last time, at least", low[-1] / classes[-1], 5.0, True),
+        ("size-class, ns, largest of all times", max(classes), 60.0, False),
+        ("size-class, growth of the cost", classes[-1] / classes[0], 2.0, False),
+        ("low-rank : the paper's low-rank (its hardware), largest", worst, 1.0, False),
+    ]
+    lines = []
+    for what, value, goal, least in told:
+        met = value >= goal if least else value <= goal
+        lines.append([what, f"{value:.3g}", f"{goal:g}", "yes" if met else "**no**"])
+    return table(["", "measured", "target", "met"], lines)
 
 
 def _growth(found: dict[str, list[Reached]]) -> str:
