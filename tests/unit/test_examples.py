@@ -11,6 +11,7 @@ import pytest
 
 import smolux as sx
 from smolux.case import parse
+from smolux.sweeps import read_axes
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = sorted((ROOT / "examples").glob("*/plot_*.py"))
@@ -26,21 +27,29 @@ GUIDES = [
 @pytest.fixture
 def small(monkeypatch, tmp_path):
     """Limit what a computation costs, and collect the results."""
-    simulate, solve = sx.simulate, sx.solve
+    simulate, solve, sweep = sx.simulate, sx.solve, sx.sweep
     results = []
 
     def small_simulation(model, times, **settings):
         few = min(settings.get("particles", 100_000), 1000)
         settings |= {"particles": few, "replicas": 3}
+        if "target_error" in settings:
+            settings |= {"replicas": 8, "max_replicas": 12}
         results.append(simulate(model, times, **settings))
         return results[-1]
 
     def coarse_solution(model, times, **settings):
-        results.append(solve(model, times, **settings | {"tolerance": 1e-4}))
+        tolerance = max(1e-4, settings.get("tolerance", 0))
+        results.append(solve(model, times, **settings | {"tolerance": tolerance}))
         return results[-1]
+
+    def corner(case, over, **settings):
+        ends = {axis.key: axis.values[-1:] for axis in read_axes(over)}
+        return sweep(case, ends, **settings)
 
     monkeypatch.setattr(sx, "simulate", small_simulation)
     monkeypatch.setattr(sx, "solve", coarse_solution)
+    monkeypatch.setattr(sx, "sweep", corner)
     monkeypatch.chdir(tmp_path)
     return results
 

@@ -67,7 +67,9 @@ def text(ds: Any, most: int = MOST) -> str:
     """
     attributes = ds.attrs
     if "sweep" in attributes:
-        return "\n".join([analysis.format_sweep(ds), *(f"warning: {w}" for w in warnings(ds))])
+        return "\n".join(
+            [analysis.format_sweep(ds).rstrip(), *(f"warning: {w}" for w in warnings(ds))]
+        )
     facts = [str(attributes.get("method", "?"))]
     if "initial_particles" in attributes:
         facts += [
