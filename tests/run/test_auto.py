@@ -63,6 +63,23 @@ def test_kernels_far_below_their_bound_are_not_left_to_rejection() -> None:
         assert method.name == "size-class", reason
 
 
+@pytest.mark.parametrize(
+    ("kernel", "particles", "method"),
+    [
+        (sx.kernels.Additive(), 5_000, "low-rank"),
+        (sx.kernels.Additive(), 50_000, "size-class"),
+        (sx.kernels.Brownian(), 5_000, "acceptance-rejection"),  # two products
+        (sx.kernels.Constant(), 5_000, "acceptance-rejection"),  # one, but nothing is rejected
+    ],
+)
+def test_one_product_and_few_particles_are_for_low_rank(
+    kernel: Any, particles: int, method: str
+) -> None:
+    rates = rates_for(sx.Model(kernel, AGGREGATION), Number())
+    found, reason = choose(rates, AGGREGATION, particles, 1.0, (1.0, 1.0), 3.0)
+    assert found.name == method, reason
+
+
 def test_shattering_and_rates_that_fade_are_followed() -> None:
     fading = [sx.processes.Aggregation(), sx.processes.Shattering("0.1*max(0, 1 - t/5)")]
     assert 1.0 < estimate(sx.kernels.Ballistic(), 10_000, 50.0, fading) < 50.0

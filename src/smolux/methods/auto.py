@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -14,6 +14,7 @@ from scipy import special
 from ..processes.base import PairProcess
 from .acceptance_rejection import AcceptanceRejection
 from .base import Method, Rates
+from .low_rank import LowRank
 from .size_class import SizeClass
 
 Float = NDArray[np.float64]
@@ -26,6 +27,9 @@ _SHARES = (np.arange(16) + 0.5) / 16
 #: the size-class method, whose tables of pairs cost more for few particles
 _TRIAL, _EVENT = 27.0, 35.0
 _CLASS_EVENT, _CLASS_FEW = 75.0, 2.0e5
+#: the low-rank method, for a kernel that is one product of factors, or the sum of such a product
+#: and its transpose; with more products it is never the best
+_ONE_PRODUCT = 88.0
 
 
 @dataclass(frozen=True)
@@ -169,9 +173,17 @@ def choose(
     candidates = candidates_per_event(rates, processes, particles, density, sizes, end)
     plain = _EVENT + _TRIAL * candidates
     classes = _CLASS_EVENT + _CLASS_FEW / particles
+    costs: dict[type[Method], float] = {AcceptanceRejection: plain, SizeClass: classes}
+    known = rates.majorant
+    if known is not None and len(known.terms) == 1 and known.least == 1.0:
+        costs[LowRank] = _ONE_PRODUCT
     estimate = "more than a million" if candidates > 1e6 else f"about {candidates:.2g}"
-    method: Callable[[], Method] = AcceptanceRejection if plain <= classes else SizeClass
-    return method(), (
+    others = "".join(
+        f"; the {method.title} method some {cost:.2g} ns"
+        for method, cost in costs.items()
+        if method is not AcceptanceRejection
+    )
+    return min(costs, key=costs.__getitem__)(), (
         f"acceptance-rejection would need {estimate} candidates an event, some "
-        f"{min(plain, 1e9):.2g} ns; the size-class method some {classes:.2g} ns"
+        f"{min(plain, 1e9):.2g} ns{others}"
     )
