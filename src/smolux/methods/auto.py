@@ -26,10 +26,10 @@ _SHARES = (np.arange(16) + 0.5) / 16
 #: nanoseconds: a candidate of acceptance-rejection, and what an event costs besides; the same of
 #: the size-class method, whose tables of pairs cost more for few particles
 _TRIAL, _EVENT = 27.0, 35.0
-_CLASS_EVENT, _CLASS_FEW = 75.0, 2.0e5
+_CLASS_EVENT, _CLASS_FEW = 68.0, 2.2e5
 #: the low-rank method, for a kernel that is one product of factors, or the sum of such a product
 #: and its transpose; with more products it is never the best
-_ONE_PRODUCT = 88.0
+_ONE_PRODUCT = 83.0
 
 
 @dataclass(frozen=True)
