@@ -228,7 +228,8 @@ def report(number: int, particles: int, repeats: int, longest: float) -> list[st
         *table(head, costs),
         "",
         "Collisions: the paper's, those of the rate equations, ours (and the difference in units "
-        "of 1e-4); candidates that became collisions:",
+        "of 1e-4; densities known to three digits leave some of them open); candidates that "
+        "became collisions:",
         "",
         *table(
             [
