@@ -91,5 +91,9 @@ processor seconds of one core, medians of interleaved repetitions (A B A B ...),
 python benchmarks/speed.py
 python benchmarks/startup.py
 python benchmarks/memory.py
+python benchmarks/solver.py
+python benchmarks/flat_low_rank.py
+python benchmarks/osinsky_2022.py
+python benchmarks/auto.py
 ```
 """
