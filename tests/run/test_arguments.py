@@ -26,7 +26,7 @@ def problems(call: Any = sx.simulate, model: Any = MODEL, times: Any = (1.0,), *
 WRONG = [
     ("method", "acceptance-rejectoin", "did you mean 'acceptance-rejection'?"),
     ("method", "invers", "did you mean 'inverse'?"),
-    ("method", "xyz", "choose from 'acceptance-rejection', 'inverse'"),
+    ("method", "xyz", "choose from 'size-class', 'acceptance-rejection'"),
     ("method", sx.methods.METHODS[0], "unknown"),  # the class, not an instance
     ("weighting", "numbers", "did you mean 'number'?"),
     ("population", "dubling", "did you mean 'doubling'?"),

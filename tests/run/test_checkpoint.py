@@ -60,7 +60,7 @@ def test_stopped_again_and_again(method: str, distribution: bool, path: Path) ->
     assert not part.attrs["complete"]
     assert np.isnan(part["collisions"].isel(time=-1)).all()
     ds, stops = go_on(path)
-    assert stops >= 2
+    assert stops >= 1  # besides the first
     assert ds.attrs["complete"]
     assert json.loads(ds.attrs["warnings"]) == []
     runs.assert_same(expected, ds)

@@ -110,12 +110,7 @@ def test_a_size_that_is_never_reached_is_no_obstacle(method: str) -> None:
 
 @pytest.mark.parametrize("bounds", [below_one, one])
 @every_method
-def test_bounds_that_do_not_hold_are_repaired(
-    method: str, bounds: Any, request: pytest.FixtureRequest
-) -> None:
-    if method == "size-class" and bounds is one:
-        reason = "where both bounds are equal, the rate is not computed"
-        request.applymarker(pytest.mark.xfail(reason=reason, raises=ValueError, strict=True))
+def test_bounds_that_do_not_hold_are_repaired(method: str, bounds: Any) -> None:
     ds = simulate(8.0, method, bounds)
     right = simulate(8.0, method, eight)
     assert found_above(right) == []

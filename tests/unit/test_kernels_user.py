@@ -129,7 +129,7 @@ def test_parameters() -> None:
 
 def test_declared() -> None:
     kernel = from_function(scaled_sum, bounds=sum_bounds, degree=1.0, gels=False, scale=3.0)
-    assert (kernel.degree, kernel.gels, kernel.rigorous) == (1.0, False, True)
+    assert (kernel.degree, kernel.gels, kernel.rigorous) == (1.0, False, False)
     lower, upper = kernel.bounds([1, 2], [3, 4], 5, 6)
     assert lower.tolist() == [18.0, 21.0]
     assert upper.tolist() == [27.0, 30.0]

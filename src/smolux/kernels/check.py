@@ -110,7 +110,8 @@ def _declared(
     except Exception as error:  # bounds of the user
         return [*problems, f"{where}: bounds raise {type(error).__name__}: {error}; correct them"]
     wrong = ~((values >= lower * (1 - 1e-9)) & (values <= upper * (1 + 1e-9)))
-    if wrong.any() and kernel.rigorous:
+    claimed = kernel.rigorous or getattr(kernel, "declared_bounds", None) is not None
+    if wrong.any() and claimed:
         k = np.flatnonzero(wrong)[0]
         problems.append(
             f"{where}: the bounds [{lower:g}, {upper:g}] of the sizes {low:.0f} to {high:.0f} do "

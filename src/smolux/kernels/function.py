@@ -70,8 +70,8 @@ class FunctionKernel(Kernel):
 
     @cached_property
     def rigorous(self) -> bool:  # type: ignore[override]
-        """Whether `bounds` is proved: declared, or found by intervals."""
-        return self.declared_bounds is not None or always_bounded(self._interval)
+        """Whether `bounds` is proved, by intervals; what is declared is checked at every pair."""
+        return self.declared_bounds is None and always_bounded(self._interval)
 
     @cached_property
     def _follows(self) -> bool:
@@ -150,7 +150,7 @@ def from_function(
         arguments with defaults are its parameters: ``def K(i, j, a=1.0)``.
     bounds : callable, optional
         ``bounds(a, b, c, d, *parameters) -> (lower, upper)`` of the rate over ``a <= i <= b``,
-        ``c <= j <= d``. Taken for proved. Found by interval arithmetic if left out, where the
+        ``c <= j <= d``. Every pair a method evaluates is checked against it. Found by interval arithmetic if left out, where the
         function has no branches; else by trial: then every pair a method evaluates is checked.
     degree : float, optional
         Homogeneity degree.

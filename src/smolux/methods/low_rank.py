@@ -143,6 +143,7 @@ class LowRank(Method):
             np.zeros((replicas, slots)),
             np.zeros((replicas, tables.weights.shape[1])),
             np.zeros((replicas, factors), np.int64),
+            np.zeros((replicas, factors)),
             *tables,
             bound,
             np.array([bits]),
@@ -165,7 +166,8 @@ class LowRank(Method):
         order[:, old:] = np.arange(old, slots)
         start = enlarged(work.start, slots)
         start[:, old:] = meta[:, TAIL, None]
-        meta[:, STAGE] = -1
+        # the quanta stay: what other replicas need must not change the course of one
+        meta[:, STAGE] = np.where(meta[:, STAGE] >= 0, -meta[:, STAGE] - 2, meta[:, STAGE])
         return work._replace(
             number=enlarged(work.number, slots),
             tree=np.zeros((*work.tree.shape[:2], levels[-1] + 1), np.int64),

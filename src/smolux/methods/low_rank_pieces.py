@@ -241,8 +241,11 @@ def update(s, w, entries, p):
 
 
 @cold_piece
-def _build(w, stage):
-    """Choose quanta for which the sums are large whole numbers, and build the trees of them."""
+def _build(w, stage, afresh):
+    """Choose quanta for which the sums are large whole numbers, and build the trees of them.
+
+    Unless `afresh`, the quanta are those of before, and so is everything that follows from them.
+    """
     w.meta[STAGE] = stage
     factors, slots = w.rank[stage, 0], w.number.shape[0]
     for slot in range(slots):
@@ -254,7 +257,11 @@ def _build(w, stage):
         for slot in range(1, slots):
             if w.number[slot] > 0.0:
                 total += w.number[slot] * w.factor[stage, slot, row]
-        scale = math.ldexp(1.0, math.floor(math.log2(_AIM / total))) if total > 0.0 else 1.0
+        if afresh:
+            w.scale[row] = 1.0
+            if total > 0.0:
+                w.scale[row] = math.ldexp(1.0, math.floor(math.log2(_AIM / total)))
+        scale = w.scale[row]
         above = 1.0 if row < factors - w.rank[stage, 2] else 0.0
         for slot in range(1, slots):
             exact = w.factor[stage, slot, row] * scale
@@ -266,7 +273,10 @@ def _build(w, stage):
             else:
                 w.tree[row, slot] = 0
         build(w.tree, w.levels, row)
-        w.least[row] = _root(w, row) >> 8
+        if afresh:
+            w.least[row] = _root(w, row) >> 8
+        elif not w.least[row] <= _root(w, row) <= _MOST:
+            w.meta[STAGE] = -1
         for k in range(w.rank[stage, 1]):
             for side in range(2):
                 if w.term[stage, k, side] == row:
@@ -285,5 +295,8 @@ def prepare(s, w, p):
         if w.rank[stage, 0] == 0:
             w.meta[WANTED] = stage
             return BOUND
-        _build(w, stage)
+        if w.meta[STAGE] == -stage - 2:  # the arrays have grown
+            _build(w, stage, False)
+        if w.meta[STAGE] != stage:
+            _build(w, stage, True)
     return 0

@@ -54,6 +54,8 @@ class Work(NamedTuple):
         Weight of each term, in quanta of its factors.
     least : int64 array of shape (R, F)
         Sums for which the quanta are too coarse.
+    scale : float64 array of shape (R, F)
+        Quanta in a unit of each factor.
     factor : float64 array of shape (S, slots, F)
         Bounds of the factors over each slot.
     shares : float64 array of shape (S, slots)
@@ -85,6 +87,7 @@ class Work(NamedTuple):
     share: np.ndarray
     weight: np.ndarray
     least: np.ndarray
+    scale: np.ndarray
     factor: np.ndarray
     shares: np.ndarray
     weights: np.ndarray
@@ -112,6 +115,7 @@ def view(w, r):
         w.share[r],
         w.weight[r],
         w.least[r],
+        w.scale[r],
         w.factor,
         w.shares,
         w.weights,
