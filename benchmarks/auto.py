@@ -153,7 +153,7 @@ def describe(found: list[Found]) -> list[str]:
                 *(_ns(one.seconds[m], one.events) for m in METHODS),
                 min(one.seconds, key=one.seconds.__getitem__),
                 one.chosen,
-                f"{one.loss:.2f}" if one.loss <= _GOAL else f"**{one.loss:.2f}**",
+                _factor(one.loss) if one.loss <= _GOAL else f"**{_factor(one.loss)}**",
             ]
         )
     losses = np.array([one.loss for one in found])
@@ -167,7 +167,7 @@ def describe(found: list[Found]) -> list[str]:
         f"Processor nanoseconds per collision, start of the replicas included; –: more than "
         f"{_HOPELESS:g} times the size-class method. Of {len(found)} cases, the choice is more "
         f"than {_GOAL} times slower than the best in {above}; the largest loss is a factor of "
-        f"{losses.max():.2f}, the median {np.median(losses):.2f}. "
+        f"{_factor(losses.max())}, the median {np.median(losses):.2f}. "
         + " ".join(
             f"Always {method}: at most {_factor(loss.max())}, above {_GOAL} in "
             f"{int((loss > _GOAL).sum())}."
@@ -185,7 +185,7 @@ def _ns(seconds: float, events: int) -> str:
 
 
 def _factor(loss: float) -> str:
-    return f"{loss:.1f}" if loss < np.inf else f"more than {_HOPELESS:g}"
+    return f"{loss:.2f}" if loss < np.inf else f"more than {_HOPELESS:g}"
 
 
 def main() -> None:
