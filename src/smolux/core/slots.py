@@ -5,6 +5,8 @@ The slot of a size is its leading ``bits + 1`` binary digits and their place: no
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from llvmlite import ir
 from numba import types
@@ -42,6 +44,7 @@ def slot_of(size, bits):
     return (shift << bits) + (size >> shift)
 
 
+@lru_cache(maxsize=32)
 def slot_edges(bits: int, octaves: int = 62) -> np.ndarray:
     """Edges of the slots of all sizes below ``2**octaves``; slot 0 is empty.
 

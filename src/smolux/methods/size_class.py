@@ -103,10 +103,15 @@ class SizeClass(Method):
 
         A bound must not depend on which replica asked first.
         """
-        bits = int(work.meta[0, BITS])
-        edges = slot_edges(bits)
         number = work.number[replica]
         largest = int(np.flatnonzero(number | work.flow[replica])[-1])
+        if (
+            not np.isnan(work.low[largest, largest])
+            and not np.isnan(work.high[1 : largest + 1, 1 : largest + 1]).any()
+        ):
+            return  # another replica has asked for it
+        bits = int(work.meta[0, BITS])
+        edges = slot_edges(bits)
         block = _OCTAVES << bits
         for start in range(0, largest + 1, block):
             if np.isnan(work.low[start + 1, start + 1]):
