@@ -150,8 +150,9 @@ def from_function(
         arguments with defaults are its parameters: ``def K(i, j, a=1.0)``.
     bounds : callable, optional
         ``bounds(a, b, c, d, *parameters) -> (lower, upper)`` of the rate over ``a <= i <= b``,
-        ``c <= j <= d``. Every pair a method evaluates is checked against it. Found by interval arithmetic if left out, where the
-        function has no branches; else by trial: then every pair a method evaluates is checked.
+        ``c <= j <= d``. Found by interval arithmetic if left out, where the function has no
+        branches; else by trial. Unless they are found by intervals, every pair a method evaluates
+        is checked against them.
     degree : float, optional
         Homogeneity degree.
     gels : bool, optional
