@@ -115,9 +115,12 @@ class Group:
         self._call(np.full(len(self.codes), DONE, np.int64), 0)
         self.compile_seconds = time.perf_counter() - start
 
-    def _call(self, codes: Int, budget: int) -> None:
+    def _loop(self) -> Any:
+        return loop_for(self.plan.model, self.plan.method, self.plan.weighting)
+
+    def _call(self, codes: Int, budget: int, loop: Any = None) -> None:
         plan = self.plan
-        loop_for(plan.model, plan.method, plan.weighting)(
+        (loop or self._loop())(
             self.state,
             self.work,
             self.tally,
@@ -135,10 +138,11 @@ class Group:
         Every call gets something done, so that a run interrupted again and again comes to its end.
         """
         budget = 10_000
+        loop = self._loop()  # found once: what tells loops apart takes time
         while not self.done:
             before = self._effort()
             start = time.perf_counter()
-            self._call(self.codes, budget)
+            self._call(self.codes, budget, loop)
             elapsed = time.perf_counter() - start
             self.seconds += elapsed
             self._serve()

@@ -336,9 +336,9 @@ def test_a_full_disk_leaves_the_results_somewhere(folder, monkeypatch):
 
 
 def test_a_time_limit_stops_and_goes_on(folder):
-    call("run", "small.toml", "-o", "whole", "-s", "run.particles=2000000", "-s", "run.replicas=2")
+    call("run", "small.toml", "-o", "whole", "-s", "run.particles=8000000", "-s", "run.replicas=2")
     stopped = call(
-        "run", "small.toml", "-o", "cut", "-s", "run.particles=2000000", "-s", "run.replicas=2",
+        "run", "small.toml", "-o", "cut", "-s", "run.particles=8000000", "-s", "run.replicas=2",
         "-s", "run.time_limit=0.01", code=3,
     )  # fmt: skip
     assert "go on with: smolux run cut" in stopped.stderr

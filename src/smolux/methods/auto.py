@@ -19,10 +19,14 @@ from .size_class import SizeClass
 
 Float = NDArray[np.float64]
 
-#: relative growth of the mean size in a step of the estimate, and the most steps
-_GROWTH, _STEPS = 0.5, 60
-#: quantiles of the sizes for which the kernel is evaluated
-_SHARES = (np.arange(16) + 0.5) / 16
+#: pivots of the rough rate equations: per octave of sizes, and up to how many times the particles
+_PER_OCTAVE, _BEYOND = 2, 1000.0
+#: share of the particles that meet in a step; that of the first step, and its growth; most steps
+_CHANGE, _FIRST, _RAMP, _STEPS = 0.04, 1e-4, 1.4, 300
+#: change of the sizes in a step, as a share of the particles, below which they are steady
+_STEADY = 1e-3
+#: quantiles that stand for the sizes at the start
+_SHARES = (np.arange(64) + 0.5) / 64
 #: nanoseconds: a candidate of acceptance-rejection, and what an event costs besides; the same of
 #: the size-class method, whose tables of pairs cost more for few particles
 _TRIAL, _EVENT = 27.0, 35.0
@@ -40,73 +44,90 @@ class Auto(Method):
     title: ClassVar[str] = "chosen by an estimate of the cost"
 
 
-def _quantiles(mean: float, heavy: float, shares: Any, by_mass: bool = False) -> Float:
-    """Sizes of a gamma law with a mean, and a mean by mass; the self-similar laws are near one."""
+def _start(mean: float, heavy: float) -> Float:
+    """Sizes of a gamma law with a mean, and a mean by mass."""
     excess = heavy / mean - 1.0
     if excess < 1e-9:
-        return np.full(np.shape(shares), max(round(mean), 1), float)
-    shape = 1.0 / excess
-    found = special.gammaincinv(shape + by_mass, shares) * mean / shape
-    return np.maximum(np.round(found), 1.0)
+        return np.array([mean])
+    return np.maximum(special.gammaincinv(1.0 / excess, _SHARES) * mean * excess, 1.0)
 
 
-def _changes(processes: Sequence[PairProcess], t: float, sizes: Float) -> tuple[Float, Float]:
-    """Return what an encounter of each pair of sizes adds to the number and the second moment."""
-    n = len(sizes)
-    number, square = np.zeros((2, n, n))
-    for process in processes:
-        factor = float(process.factor(t))
-        out, counts = np.zeros((2, process.entries), np.int64)
-        for a in range(n):
-            for b in range(a, n):
-                i, j = int(sizes[a]), int(sizes[b])
-                made = process.outcome(i, j, out, counts)
-                new = [(float(k), float(c)) for k, c in zip(out[:made], counts[:made], strict=True)]
-                number[a, b] += factor * (sum(c for _, c in new) - 2.0)
-                square[a, b] += factor * (sum(c * k * k for k, c in new) - i * i - j * j)
-    upper = np.triu(np.ones((n, n)), 1)
-    return number + (number * upper).T, square + (square * upper).T
+class _Grid:
+    """Rate equations on pivots 1, 2, 3, 4, 6, 8, ...
 
-
-def _course(
-    rates: Rates,
-    processes: Sequence[PairProcess],
-    density: float,
-    mean: float,
-    heavy: float,
-    end: float,
-) -> Float:
-    """Follow the mean sizes, by number and by mass: rows of both, the mean rate, and encounters.
-
-    The two moment equations, closed by a gamma law.
+    What appears between two pivots is shared by them, so that number and mass are kept.
     """
-    t, mass = 0.0, density * mean
-    course = []
-    for _ in range(_STEPS):
-        k = _quantiles(mean, heavy, _SHARES)
-        rate = _rates(rates, k)
-        gain = float((_changes(processes, t, k)[0] * rate).mean())
-        m = _quantiles(mean, heavy, _SHARES, by_mass=True)
-        by_mass = _rates(rates, m) / (m[:, None] * m)
-        spread = float((_changes(processes, t, m)[1] * by_mass).mean())
-        # relative changes of the number of particles and of the second moment
-        down, up = 0.5 * gain * mass / mean, 0.5 * spread * mass / heavy
-        fastest = max(abs(down), abs(up))
-        step = min(_GROWTH / fastest if fastest else math.inf, end - t)
-        total = sum(float(process.factor(t)) for process in processes)
-        met = 0.5 * float(rate.mean()) * mass / mean * total * step
-        course.append((mean, heavy, float(rate.mean()), met))
-        mean = max(mean * math.exp(-down * step), 1.0)
-        heavy = max(heavy * math.exp(up * step), mean)
-        t += step
-        if t >= end or heavy > 1e12:
-            break
-    return np.array(course)
 
+    def __init__(self, rates: Rates, processes: Sequence[PairProcess], largest: float) -> None:
+        steps = np.arange(int(_PER_OCTAVE * math.log2(max(largest, 8.0))) + 2)
+        self.size = np.unique(np.round(2.0 ** (steps / _PER_OCTAVE)))
+        self.i, self.j = np.triu_indices(len(self.size))
+        rate = rates.arrays(self.size[self.i], self.size[self.j])
+        rate = np.where(np.isfinite(rate), rate, 0.0)
+        self.rate = np.where(self.i == self.j, 0.5 * rate, rate)
+        self.processes = processes
+        self.gain = [self._gain(process) for process in processes]
 
-def _rates(rates: Rates, sizes: Float) -> Float:
-    values = rates.arrays(sizes[:, None], sizes[None, :])
-    return np.where(np.isfinite(values), values, 0.0)
+    def _gain(self, process: PairProcess) -> tuple[Any, Any, Float]:
+        """Return pairs, the pivots where something appears when they meet, and how much."""
+        sizes, counts = np.zeros((2, process.entries), np.int64)
+        whole = [int(size) for size in self.size]
+        made = []
+        for pair, (i, j) in enumerate(zip(self.i.tolist(), self.j.tolist(), strict=True)):
+            for e in range(process.outcome(whole[i], whole[j], sizes, counts)):
+                made.append((pair, sizes[e], counts[e]))
+        pair, size, number = np.array(made, float).T
+        place, number = self._spread(size, number)
+        return np.tile(pair.astype(int), 2), place, number
+
+    def _spread(self, size: Float, number: Float) -> tuple[Any, Float]:
+        over = np.maximum(size / self.size[-1], 1.0)
+        size, number = size / over, number * over
+        right = np.clip(np.searchsorted(self.size, size), 1, len(self.size) - 1)
+        low, high = self.size[right - 1], self.size[right]
+        up = (size - low) / (high - low)
+        return (
+            np.concatenate((right - 1, right)),
+            np.concatenate((number * (1.0 - up), number * up)),
+        )
+
+    def _sum(self, place: Any, number: Float) -> Float:
+        return np.asarray(np.bincount(place, number, len(self.size)), float)
+
+    def course(self, density: float, start: Float, end: float) -> list[tuple[Float, float, float]]:
+        """Follow the densities; with the mean rate, and the encounters for each particle present.
+
+        One entry a step.
+        """
+        one = np.full(len(start), density / len(start))
+        n = self._sum(*self._spread(start, one))
+        mass, t, found = float(n @ self.size), 0.0, []
+        for k in range(_STEPS):
+            factors = [float(process.factor(t)) for process in self.processes]
+            total = sum(factors)
+            met = self.rate * n[self.i] * n[self.j]
+            number, events = float(n.sum()), float(met.sum()) * total
+            if not events > 0.0:
+                break
+            share = min(_CHANGE, _FIRST * _RAMP**k)
+            step = min(share * number / events, end - t)
+            gain = sum(
+                f * self._sum(place, met[pair] * made)
+                for f, (pair, place, made) in zip(factors, self.gain, strict=True)
+            )
+            lost = self._sum(self.i, met) + self._sum(self.j, met)
+            lost = np.divide(lost, n, out=np.zeros_like(n), where=n > 0.0)
+            # implicit in the loss: no density gets negative, however long the step
+            new = (n + step * gain) / (1.0 + step * total * lost)
+            new *= mass / (new @ self.size)
+            found.append((new, 2.0 * float(met.sum()) / number**2, events * step / number))
+            steady = share == _CHANGE and np.abs(new - n).sum() < _STEADY * number
+            n, t = new, t + step
+            if t >= end or steady:
+                break
+        if found and t < end:  # the rest at the last state
+            found.append((n, found[-1][1], found[-1][1] * 0.5 * float(n.sum()) * total * (end - t)))
+        return found
 
 
 def candidates_per_event(
@@ -119,6 +140,9 @@ def candidates_per_event(
 ) -> float:
     """Estimate the candidates that acceptance-rejection needs for an event, up to the time `end`.
 
+    By a rough solution of the rate equations, and the largest size to be expected of so many
+    particles.
+
     Parameters
     ----------
     rates, processes, particles, density, end
@@ -126,17 +150,18 @@ def candidates_per_event(
     sizes : tuple of float
         Mean sizes at the start, by number and by mass.
     """
-    mean, heavy, average, met = _course(rates, processes, density, *sizes, end).T
-    if not met.any():
+    grid = _Grid(rates, processes, min(_BEYOND * particles * sizes[0], 1e15))
+    course = grid.course(density, _start(*sizes), end)
+    if not course:
         return 1.0
-    last = 1.0 - 1.0 / max(particles, 2)
-    largest = np.array([_quantiles(m, h, last) for m, h in zip(mean, heavy, strict=True)])
-    largest = np.minimum(largest, particles * mean)
-    one = np.ones(len(mean))
+    densities = np.array([entry[0] for entry in course])
+    above = np.cumsum(densities[:, ::-1], axis=1)[:, ::-1] / densities.sum(axis=1, keepdims=True)
+    present = np.maximum((above * particles >= 1.0).sum(axis=1) - 1, 0)
+    largest, one = grid.size[present], np.ones(len(course))
+    average, met = np.array([entry[1:] for entry in course]).T
     bound = rates.bounds(one, largest, one, largest)[1]  # in one call: proofs are dear
     with np.errstate(all="ignore"):
         candidates = np.where(met > 0.0, np.maximum(bound / average, 1.0), 0.0)
-    # encounters are weighed by their number for each particle present
     found = float(candidates @ met / met.sum())
     return found if math.isfinite(found) else math.inf
 

@@ -13,7 +13,7 @@ from ..core.state import LARGEST, PARTICLES, TIME, State
 from ..errors import InputError
 from . import size_class_pieces as pieces
 from .base import Int, Method, Rates, enlarged, spread
-from .size_class_pieces import AHEAD, BITS, CHUNK, FREE, META, NEXT, STALE, WIDEST, Work
+from .size_class_store import AHEAD, BITS, CHUNK, FREE, META, NEXT, STALE, WIDEST, Work
 
 #: octaves of sizes by which arrays and bounds are extended
 _OCTAVES = 4

@@ -1,0 +1,112 @@
+"""The table of pairs of classes from which the size-class method draws its candidates."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..core.alias import build
+from ..core.compile import cold_piece, piece
+from ..core.state import BOUND, MAJORANT, PARTICLES, SINCE
+from .size_class_store import AHEAD, BLOCK, CHUNK, NEXT, PAIRS, SHARE, SPAN, STALE
+
+
+@cold_piece
+def _rates_of_places(w, used):
+    """Rate at which one place of each class gets candidates, into `weight`; their sum over all."""
+    whole = 0.0
+    for k in range(used):
+        g = w.queue[k]
+        total = 0.0
+        for m in range(used):
+            total += w.number[w.queue[m]] * w.high[g, w.queue[m]]
+        w.weight[k] = total
+        whole += 0.5 * w.number[g] * total
+    return whole
+
+
+@cold_piece
+def _give_room(s, w, used):
+    """Choose for how many particles of each class candidates are drawn until the next table.
+
+    More places cost candidates that find them empty; fewer, a new table as soon as a class is full.
+    A table costs about as much as 16 candidates and a quarter of one for each pair of classes. So
+    there is room for what will come in, and for its scatter as far as a place costs fewer
+    candidates than the chance of a new table. The number of events until the next table weighs its
+    cost against candidates lost to particles that have gone.
+    """
+    since = float(max(s.count[SINCE], 1))
+    n, table = float(s.count[PARTICLES]), 16.0 + 0.125 * used * (used + 1)
+    most = w.where.shape[1] << w.meta[CHUNK]
+    events = max(min(math.sqrt(n * table), 0.25 * n, 32.0 * since + 64.0), 1.0)
+    w.meta[BLOCK] = np.int64(events)
+    w.meta[SPAN] = w.meta[SPAN] // 2 + np.int64(since)
+    whole = _rates_of_places(w, used)
+    for k in range(used):
+        g = w.queue[k]
+        come = w.flow[g] / (SHARE * w.meta[SPAN])
+        gain = max(w.number[g] - w.before[g] - math.sqrt(come * since), 0.0) / since
+        worth = table * whole / (events * w.weight[k])
+        spread = math.sqrt(2.0 * math.log(worth)) if worth > 1.0 else 0.0
+        slack = events * gain + spread * math.sqrt(events * come)
+        w.room[g] = w.number[g] + np.int64(slack + 0.5)
+        if w.listed[g]:
+            w.room[g] = min(w.room[g], most)
+        w.before[g] = w.number[g]
+        w.flow[g] //= 2
+
+
+@cold_piece
+def _weigh(s, w, used):
+    """Enter the pairs of classes and their rates into the table; whether their bounds are known."""
+    pairs, total = 0, 0.0
+    for k in range(used):
+        g = w.queue[k]
+        for m in range(k, used):
+            h = w.queue[m]
+            half = 0.5 if g == h else 1.0
+            weight = half * float(w.room[g]) * float(w.room[h]) * w.high[g, h]
+            if math.isnan(weight):
+                return False
+            if weight > 0.0:
+                w.weight[pairs] = weight
+                w.classes[pairs] = (g << 16) | h
+                total += weight
+                pairs += 1
+    s.clock[MAJORANT] = total
+    w.meta[PAIRS] = pairs
+    return True
+
+
+@cold_piece
+def _renew(s, w):
+    """Make the table of pairs of classes afresh; `BOUND` if a bound is not known yet."""
+    used = 0
+    for g in range(1, w.number.shape[0]):
+        if w.number[g] > 0 or w.flow[g] > 0:
+            w.queue[used] = g
+            used += 1
+        else:
+            w.room[g] = w.before[g] = 0
+    largest = w.queue[used - 1]
+    if math.isnan(w.low[largest, largest]):
+        return BOUND
+    _give_room(s, w, used)
+    if not _weigh(s, w, used):
+        return BOUND
+    s.count[SINCE] = 0
+    w.meta[STALE] = 0
+    w.meta[NEXT] = AHEAD
+    pairs = w.meta[PAIRS]
+    if pairs > 0:
+        build(w.weight[:pairs], s.clock[MAJORANT], w.share, w.alias, w.queue)
+    return 0
+
+
+@piece
+def prepare(s, w, p):
+    """Renew the table if it is stale or its time has come."""
+    if w.meta[STALE] == 1 or s.count[SINCE] >= w.meta[BLOCK]:
+        return _renew(s, w)
+    return 0
