@@ -72,16 +72,17 @@ def test_sizes_beyond_32_bits_and_beyond_the_classes_of_the_start() -> None:
 
 
 def test_shattering_fills_the_lists_beyond_their_start() -> None:
-    case = model(kernel(c=1.0), 0.02, sx.initial.from_sizes({500: 1.0}))
-    ds = sx.simulate(case, [0.5, 5.0], method="size-class", particles=300, replicas=16, seed=3,
+    case = model(kernel(c=1.0), 0.02, sx.initial.from_sizes({60: 1.0}))
+    ds = sx.simulate(case, [0.5, 5.0], method="size-class", particles=20_000, replicas=8, seed=3,
                      distribution=True)  # fmt: skip
-    assert ds["particles"].values.max() > 5_000
-    assert (ds["moment"].sel(order=1).values == 500.0).all()
-    # N' = 500 * 0.02 N - (1/2 + 0.02) N**2, whatever the sizes are
-    exact = 1.0 / (0.052 + (1.0 - 0.052) * np.exp(-10.0 * np.array([0.5, 5.0])))
+    assert ds["particles"].values.max() > 40_000
+    assert (ds["moment"].sel(order=1).values == 60.0).all()
+    # N' = 60 * 0.02 N - (1/2 + 0.02) N**2, whatever the sizes are
+    steady = 0.52 / 1.2
+    exact = 1.0 / (steady + (1.0 - steady) * np.exp(-1.2 * np.array([0.5, 5.0])))
     found = ds["number_density"].values
     error = found.std(axis=0, ddof=1) / np.sqrt(len(found))
-    assert (np.abs(found.mean(axis=0) - exact) < 5 * error).all()
+    assert (np.abs(found.mean(axis=0) - exact) < 7 * error).all()  # Student, 7 degrees
 
 
 def test_the_number_of_classes_is_checked() -> None:
@@ -92,5 +93,5 @@ def test_the_number_of_classes_is_checked() -> None:
 def test_a_kernel_that_fails_beyond_some_size_is_named() -> None:
     law = sx.kernels.formula("1/(c - i*j)", c=4e12)  # infinite for sizes of two million
     case = model(law, initial=sx.initial.from_sizes({1_000_000: 1.0}))
-    with pytest.raises(sx.errors.InputError, match="no finite bound|gave .* for the sizes"):
+    with pytest.raises(sx.errors.InputError, match=r"no finite bound|gave .* for the sizes"):
         sx.simulate(case, [1e15], method="size-class", particles=100, replicas=1, seed=1)
