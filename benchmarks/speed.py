@@ -110,8 +110,8 @@ def fixed_cost() -> list[str]:
     seconds = [loop_seconds(group) for group in groups]
     return [
         f"A run of {groups[0].events} collisions takes {1e3 * np.median(seconds):.1f} ms: the loop "
-        "returns to Python for a bound of the kernel each time the largest size has grown by half "
-        "an octave. This is what short runs of few particles spend their time on.",
+        "returns to Python for a bound of the kernel each time the largest size has grown by two "
+        "octaves. This is what short runs of few particles spend their time on.",
     ]
 
 
