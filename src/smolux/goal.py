@@ -136,7 +136,7 @@ def make_goal(
     What is wrong is added to `problems`.
     """
     name = _target(target, orders, sizes, problems)
-    most = _whole(max_replicas)
+    most = whole(max_replicas)
     if most is None or most < 1:
         problems.append(f"max_replicas = {max_replicas!r}: must be a whole number of at least 1")
     if target_error is None:
@@ -147,7 +147,7 @@ def make_goal(
             f"target_error = {target_error!r}: must be a number between 0 and 1, the half width of "
             "the 95 % interval over the mean, such as 0.001"
         )
-    first = _whole(replicas)
+    first = whole(replicas)
     if first is not None and first < FEWEST:
         problems.append(
             f"replicas = {replicas!r}: with target_error at least {FEWEST}, with which the run "
@@ -162,10 +162,11 @@ def make_goal(
     return Goal(name, float(target_error), first, most)
 
 
-def _whole(value: Any) -> int | None:
+def whole(value: Any) -> int | None:
+    """Return a whole number as an int; None if it is none."""
     try:
-        whole = int(value)
-        return whole if whole == value and not isinstance(value, bool) else None
+        number = int(value)
+        return number if number == value and not isinstance(value, bool) else None
     except (TypeError, ValueError, OverflowError):
         return None
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from .assembly import rates_for
 from .core.state import Grid
 from .errors import InputError, did_you_mean
-from .goal import Goal, make_goal
+from .goal import Goal, make_goal, whole
 from .methods import METHODS
 from .methods.auto import Auto, choose
 from .methods.base import Method
@@ -163,12 +163,9 @@ def _chosen(what: str, value: Any, registry: Sequence[Any], kind: type, problems
 
 
 def _whole(what: str, value: Any, least: int, problems: list[str], most: float = math.inf) -> int:
-    try:
-        whole = int(value)
-        if whole == value and least <= whole <= most and not isinstance(value, bool):
-            return whole
-    except (TypeError, ValueError, OverflowError):
-        pass
+    number = whole(value)
+    if number is not None and least <= number <= most:
+        return number
     limits = f"of at least {least}" if most == math.inf else f"from {least} to {most}"
     problems.append(f"{what} = {value!r}: must be a whole number {limits}")
     return least

@@ -146,10 +146,10 @@ def simulate(
         raise InputError(problems)
     if executor is not None and not isinstance(executor, ThreadPoolExecutor):
         return Elsewhere(plan, executor, progress, workers_of(executor)).finish()
-    groups = [Group.start(plan, *part) for part in plan.groups(_workers())]
+    groups = [Group.start(plan, *part) for part in plan.groups(cores())]
     file = None if checkpoint is None else Path(checkpoint).expanduser()
     return Threads(
-        plan, groups, executor, progress, file, checkpoint_every, time_limit, _workers()
+        plan, groups, executor, progress, file, checkpoint_every, time_limit, cores()
     ).finish()
 
 
@@ -188,7 +188,7 @@ def resume(
     file = Path(checkpoint).expanduser()
     plan, groups = checkpoints.load(file, model)
     return Threads(
-        plan, groups, executor, progress, file, checkpoint_every, time_limit, _workers()
+        plan, groups, executor, progress, file, checkpoint_every, time_limit, cores()
     ).finish()
 
 
@@ -229,7 +229,3 @@ def _path_problems(checkpoint: Any) -> list[str]:
     if not path.absolute().parent.is_dir():
         return [f"{where}: there is no folder {str(path.parent)!r}; create it first"]
     return []
-
-
-def _workers() -> int:
-    return cores()

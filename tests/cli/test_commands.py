@@ -5,12 +5,11 @@ from __future__ import annotations
 import tomllib
 
 import pytest
-from typer.testing import CliRunner
+from command import call
 
 import smolux
 from smolux.case import load, parse
 from smolux.cli import catalogue, templates
-from smolux.cli.app import app
 from smolux.kernels import KERNELS
 
 SMALL = """\
@@ -28,12 +27,6 @@ figures = []
 """
 
 DRAWN = SMALL.replace("figures = []", "")
-
-
-def call(*arguments: str, code: int = 0):
-    result = CliRunner().invoke(app, [str(a) for a in arguments])
-    assert result.exit_code == code, (result.stdout, result.stderr, result.exception)
-    return result
 
 
 @pytest.fixture

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command import call
 
 import smolux
 from smolux import results
-from smolux.cli.app import app
 
 CASE = """\
 [kernel]
@@ -36,12 +35,6 @@ figures = []
 report = false
 """
 OVER = ("--over", "processes.shattering.rate=0.1:0.6:6")
-
-
-def call(*arguments: str, code: int = 0):
-    result = CliRunner().invoke(app, [str(a) for a in arguments])
-    assert result.exit_code == code, (result.stdout, result.stderr, result.exception)
-    return result
 
 
 @pytest.fixture

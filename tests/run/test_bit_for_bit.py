@@ -77,7 +77,7 @@ def test_length_of_a_slice(method: str, monkeypatch: pytest.MonkeyPatch) -> None
 def test_threads_and_groups(method: str, rate: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = simulate(method, rate, replicas=5)
     for workers in (1, 2, 3, 5, 16):
-        monkeypatch.setattr(stochastic, "_workers", lambda n=workers: n)
+        monkeypatch.setattr(stochastic, "cores", lambda n=workers: n)
         runs.assert_same(expected, simulate(method, rate, replicas=5))
     for workers in (1, 2):
         with ThreadPoolExecutor(workers) as executor:

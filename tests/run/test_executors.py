@@ -125,7 +125,7 @@ def test_a_run_survives_the_death_of_workers(
 
 @pytest.mark.parametrize("workers", [1, 2, 4])
 def test_any_number_of_workers(workers: int, expected: Any, monkeypatch: Any) -> None:
-    monkeypatch.setattr(stochastic, "_workers", lambda: workers)
+    monkeypatch.setattr(stochastic, "cores", lambda: workers)
     assert expected.equals(simulate())
     with ThreadPoolExecutor(workers) as pool:
         assert expected.equals(simulate(executor=pool))

@@ -101,7 +101,7 @@ def test_the_bias_of_few_particles_is_told() -> None:
 def test_the_same_on_threads_and_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     expected = simulate()
     for workers in (1, 2, 4):
-        monkeypatch.setattr(stochastic, "_workers", lambda n=workers: n)
+        monkeypatch.setattr(stochastic, "cores", lambda n=workers: n)
         assert expected.identical(simulate().assign_attrs(expected.attrs))
         with ThreadPoolExecutor(workers) as executor:
             assert expected.equals(simulate(executor=executor))

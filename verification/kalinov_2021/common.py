@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 import smolux as sx
+from smolux.plotting.style import MARKERS, PALETTE
 
 TARGETS = Path(__file__).parent / "targets"
 AR, INVERSE = "acceptance-rejection", "inverse"
@@ -106,3 +107,20 @@ def loop_seconds(physics: sx.Model, time_end: float, particles: int, method: str
     start = time.thread_time()
     group.advance(lambda: False)
     return time.thread_time() - start
+
+
+def draw_first_runs(ax: Any, data: dict[str, Any]) -> None:
+    """Draw the first long run of each method."""
+    for m, method in enumerate(METHODS):
+        ax.plot(
+            data["times"],
+            np.asarray(data["runs"][method]["long"])[0],
+            ms=2.2,
+            mfc="none",
+            mew=0.5,
+            label=f"{LABEL[method]}, one run",
+            zorder=3,
+            color=PALETTE[m],
+            marker=MARKERS[m],
+            ls="none",
+        )

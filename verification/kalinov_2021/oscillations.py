@@ -10,17 +10,17 @@ import numpy as np
 
 import smolux as sx
 from smolux.analysis.oscillations import extrema
-from smolux.plotting.style import MARKERS, PALETTE, new_figure, styled, use_linear
+from smolux.plotting.style import PALETTE, new_figure, styled, use_linear
 
 from ..outcome import Check, Item, Outcome, Table, at_most, mean_sigmas, normal_sigmas, worst
 from .common import (
     AR,
-    INVERSE,
     LABEL,
     METHODS,
     SEED,
     brownian,
     curves,
+    draw_first_runs,
     second_moments,
     simulate,
     target,
@@ -227,19 +227,7 @@ def _figure(case: Case, data: dict[str, Any]) -> Any:
         label="rate equations (solver)",
         zorder=2,
     )
-    for m, method in enumerate((AR, INVERSE)):
-        look = {"color": PALETTE[m], "marker": MARKERS[m], "ls": "none"}
-        first = np.asarray(data["runs"][method]["long"])[0]
-        ax.plot(
-            data["times"],
-            first,
-            ms=2.2,
-            mfc="none",
-            mew=0.5,
-            label=f"{LABEL[method]}, one run",
-            zorder=3,
-            **look,
-        )
+    draw_first_runs(ax, data)
     rows = [r for r in target(case.name)["rows"] if r["t"] <= end]
     ax.plot(
         [r["t"] for r in rows],

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 import smolux as sx
-from smolux.plotting.style import MARKERS, PALETTE, new_figure, styled, use_linear
+from smolux.plotting.style import new_figure, styled, use_linear
 
 from ..outcome import Check, Item, Outcome, Table, at_most, mean_sigmas, worst
-from .common import AR, INVERSE, LABEL, METHODS, brownian, curves, second_moments
+from .common import AR, LABEL, METHODS, brownian, curves, draw_first_runs, second_moments
 
 RATE = "0.01 * (1 - t/400)"
 _SAMPLES = (2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0)
@@ -43,19 +43,7 @@ def _figure(data: dict[str, Any]) -> Any:
     ax.plot(
         data["fine"], data["line"], color="black", lw=0.9, label="rate equations (solver)", zorder=2
     )
-    for m, method in enumerate((AR, INVERSE)):
-        look = {"color": PALETTE[m], "marker": MARKERS[m], "ls": "none"}
-        first = np.asarray(data["runs"][method]["long"])[0]
-        ax.plot(
-            data["times"],
-            first,
-            ms=2.2,
-            mfc="none",
-            mew=0.5,
-            label=f"{LABEL[method]}, one run",
-            zorder=3,
-            **look,
-        )
+    draw_first_runs(ax, data)
     ax.set(xlabel="time $t$", ylabel="$M_2$", xlim=(0, data["fine"][-1]), ylim=(0, None))
     use_linear(ax, "x")
     use_linear(ax, "y")

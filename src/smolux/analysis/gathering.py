@@ -12,6 +12,7 @@ import xarray as xr
 from smolux.errors import InputError
 
 from .statistics import over_replicas, quantile
+from .table import aligned
 
 #: describe the bins, which may differ in number from point to point
 _BIN_COORDINATES = ("bin_lower", "bin_upper", "bin_width")
@@ -207,9 +208,7 @@ def format_sweep(ds: xr.Dataset) -> str:
         If it is no sweep.
     """
     header, rows = sweep_table(ds)
-    table = [header, *rows]
-    width = [max(map(len, column)) for column in zip(*table, strict=True)]
-    lines = ["  ".join(c.rjust(w) for c, w in zip(r, width, strict=True)).rstrip() for r in table]
+    lines = [line.rstrip() for line in aligned([header, *rows])]
     title = str(ds.attrs.get("title", ""))
     time = f"at t = {float(ds['time'].values[-1]):g}, or the last time that was reached"
     return "\n".join([*([title] if title else []), time, "", *lines]) + "\n"

@@ -116,10 +116,11 @@ def format_table(summary: xr.Dataset, variables: Sequence[str] | None = None) ->
     """
     lines: list[str] = []
     for title, rows in tables(summary, variables):
-        width = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines += [
-            title,
-            *("  ".join(c.rjust(w) for c, w in zip(r, width, strict=True)) for r in rows),
-            "",
-        ]
+        lines += [title, *aligned(rows), ""]
     return "\n".join([*lines, summary.attrs.get("notes", "")]).rstrip() + "\n"
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Write rows of cells as lines with columns of one width."""
+    width = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(c.rjust(w) for c, w in zip(r, width, strict=True)) for r in rows]

@@ -10,8 +10,9 @@ from ..case.physics import model_tables
 from ..case.settings import as_table
 from ..case.write import value
 from ..errors import InputError
+from ..executors import cores
 from .console import amount, duration
-from .estimate import cores, estimate, negative_rates, physics_warnings
+from .estimate import estimate, negative_rates, physics_warnings
 
 
 def text(case: Case, source: str) -> str:

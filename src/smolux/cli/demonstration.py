@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import analysis
+from ..analysis.table import aligned
 from ..case import Case, Output, Run
 from ..errors import InputError
 from ..files import replacing
@@ -48,7 +49,7 @@ def run(seed: int, folder: Path) -> tuple[str, bool]:
     rows = analysis.tables(analysis.summary(outcome.results), ["number_density"])[0][1]
     header = ("time", "clusters per volume", *rows[0][2:])
     words, agrees = verdict(outcome.results)
-    return "\n".join([_text([header, *rows[1:]]), "", words, _where(directory)]), agrees
+    return "\n".join([*aligned([header, *rows[1:]]), "", words, _where(directory)]), agrees
 
 
 def _folder(folder: Path, wanted: Case) -> rundir.RunDirectory:
@@ -65,13 +66,6 @@ def _folder(folder: Path, wanted: Case) -> rundir.RunDirectory:
     with replacing(directory.case) as temporary:
         temporary.write_text(wanted.to_toml(), encoding="utf-8")
     return directory
-
-
-def _text(rows: list[tuple[str, ...]]) -> str:
-    width = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return "\n".join(
-        "  ".join(cell.rjust(w) for cell, w in zip(row, width, strict=True)) for row in rows
-    )
 
 
 def verdict(ds: Any) -> tuple[str, bool]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
@@ -15,6 +14,7 @@ import smolux
 from ..case import Case
 from ..case.settings import Run
 from ..errors import Interrupted
+from ..executors import cores
 from ..initial import Sizes
 
 Float = NDArray[np.float64]
@@ -172,13 +172,6 @@ def estimate(case: Case) -> Estimate:
         output,
         [*physics_warnings(case), *_population_warnings(run, small), *_pilot_warnings(small)],
     )
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _bytes(case: Case, run: Run, small: Pilot) -> tuple[float, float]:

@@ -42,10 +42,11 @@ def build(weights, total, share, alias, queue):
             high += 1
             queue[low] = rich
             low += 1
-    for k in range(high, n):  # what rounding has left over
-        share[queue[k]] = 1.0
+    # what rounding has left over at one end gives itself in any case
     for k in range(first, low):
-        share[queue[k]] = 1.0 if weights[queue[k]] > 0.0 else share[queue[k]]
+        share[queue[k]] = 1.0
+    for k in range(high, n):
+        share[queue[k]] = 1.0
 
 
 @piece

@@ -105,16 +105,10 @@ class SizeClass(Method):
         """
         number = work.number[replica]
         largest = int(np.flatnonzero(number | work.flow[replica])[-1])
-        if (
-            not np.isnan(work.low[largest, largest])
-            and not np.isnan(work.high[1 : largest + 1, 1 : largest + 1]).any()
-        ):
-            return  # another replica has asked for it
         bits = int(work.meta[0, BITS])
-        edges = slot_edges(bits)
-        block = _OCTAVES << bits
+        edges, block = slot_edges(bits), _OCTAVES << bits
         for start in range(0, largest + 1, block):
-            if np.isnan(work.low[start + 1, start + 1]):
+            if np.isnan(work.low[start + 1, start + 1]):  # no other replica has asked for it
                 g, h = np.triu_indices(min(start + block, len(edges) - 1))
                 new = (h >= start) & (g >= 1)
                 g, h = g[new], h[new]
