@@ -198,7 +198,11 @@ class Threads(Run):
         halt = Event()
         begun, events = time.perf_counter(), sum(g.events for g in self.groups)
         due = min(self.saved + self.every if self.checkpoint else np.inf, self.started + self.limit)
-        waiting = [pool.submit(g.advance, halt.is_set) for g in self.groups if not g.done]
+
+        def stop() -> bool:  # asked by the workers: this thread may wake late on a busy machine
+            return halt.is_set() or time.perf_counter() >= due
+
+        waiting = [pool.submit(g.advance, stop) for g in self.groups if not g.done]
         try:
             while waiting and time.perf_counter() < due:
                 tick = min(_TICK, 0.01 + 0.1 * (time.perf_counter() - begun))
