@@ -33,6 +33,7 @@ _LAZY = {
             "plotting",
             "processes",
             "results",
+            "spatial",
             "weighting",
         )
     ),
@@ -59,6 +60,7 @@ __all__ = [
     "resume",
     "simulate",
     "solve",
+    "spatial",
     "summary",
     "sweep",
     "weighting",
@@ -74,6 +76,7 @@ if TYPE_CHECKING:
         plotting,
         processes,
         results,
+        spatial,
         weighting,
     )
     from . import plotting as plot

@@ -124,20 +124,25 @@ _RAGGED_NAMES = {
 }
 
 
-def _provenance(model: Model, records: Records) -> dict[str, str | int | float]:
+def provenance(title: str, given: Mapping[str, Any]) -> dict[str, str | int | float]:
+    """Return the attributes of a result: where it comes from, and all that is `given` about it."""
     own = {
         "Conventions": "CF-1.11",
-        "title": "Kinetics of aggregation and fragmentation",
+        "title": title,
         "source": f"smolux {__version__}",
         "smolux_schema": SCHEMA,
         "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "platform": platform.platform(),
         "versions": _versions(),
-        "model": model_to_dict(model),
-        "warnings": list(records.warnings),
     }
-    given = {k: v for k, v in records.attributes.items() if k != "units" and v is not None}
-    return {key: _attribute(value) for key, value in (own | given).items()}
+    known = {key: value for key, value in given.items() if value is not None}
+    return {key: _attribute(value) for key, value in (own | known).items()}
+
+
+def _provenance(model: Model, records: Records) -> dict[str, str | int | float]:
+    own = {"model": model_to_dict(model), "warnings": list(records.warnings)}
+    given = {k: v for k, v in records.attributes.items() if k != "units"}
+    return provenance("Kinetics of aggregation and fragmentation", own | given)
 
 
 def to_dataset(model: Model, records: Records) -> xr.Dataset:
@@ -225,12 +230,12 @@ def population(ds: xr.Dataset, replica: int, time: float) -> tuple[NDArray[np.in
     return ds["sample_size"].values[row], ds["sample_count"].values[row]
 
 
-def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> Path:
+def save(ds: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
     """Write a result as a netCDF-4 file, whole or not at all.
 
     Parameters
     ----------
-    ds : xarray.Dataset
+    ds : xarray.Dataset or xarray.DataTree
     path : str or path
         Replaced in one step if it exists; see `smolux.files.replacing`.
 
@@ -245,23 +250,33 @@ def save(ds: xr.Dataset, path: str | os.PathLike[str]) -> Path:
     OSError
         If the disk is full or read-only; an old file stays as it was.
     """
-    ds = ds.assign_attrs({k: _attribute(v) for k, v in ds.attrs.items() if v is not None})
-    ds = ds.drop_encoding()
-    # small arrays gain nothing; shuffling the bytes first is what makes doubles compress
-    packed = {"zlib": True, "complevel": 4, "shuffle": True}
-    encoding = {
-        name: packed
-        for name, variable in ds.variables.items()
-        if variable.size > 2048 and variable.dtype.kind in "fi"
-    }
+    attributes = {k: _attribute(v) for k, v in ds.attrs.items() if v is not None}
     # in memory first: HDF5 crashes the process when the disk fills up while it writes
-    content = ds.to_netcdf(engine="h5netcdf", encoding=encoding)
+    if isinstance(ds, xr.DataTree):
+        tree = ds.map_over_datasets(lambda node: node.drop_encoding())
+        tree.attrs = attributes
+        encodings = {node.path: _packing(node.to_dataset(inherit=False)) for node in tree.subtree}
+        content = tree.to_netcdf(engine="h5netcdf", encoding=encodings)
+    else:
+        ds = ds.assign_attrs(attributes).drop_encoding()
+        content = ds.to_netcdf(engine="h5netcdf", encoding=_packing(ds))
     with replacing(path) as temporary:
         temporary.write_bytes(content)
     return Path(path)
 
 
-def load(path: str | os.PathLike[str]) -> xr.Dataset:
+def _packing(ds: xr.Dataset) -> dict[Any, dict[str, Any]]:
+    """How the arrays of a file are compressed."""
+    # small arrays gain nothing; shuffling the bytes first is what makes doubles compress
+    packed = {"zlib": True, "complevel": 4, "shuffle": True}
+    return {
+        name: packed
+        for name, variable in ds.variables.items()
+        if variable.size > 2048 and variable.dtype.kind in "fi"
+    }
+
+
+def load(path: str | os.PathLike[str]) -> Any:
     """Read a result that `save` wrote; bit for bit the same, all in memory.
 
     Parameters
@@ -270,7 +285,7 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
 
     Returns
     -------
-    xarray.Dataset
+    xarray.Dataset, or xarray.DataTree of a spatial run
 
     Raises
     ------
@@ -284,6 +299,9 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
         raise InputError(f"path = {str(path)!r}: {what}; name a results file such as results.nc")
     try:
         ds = xr.load_dataset(file, engine="h5netcdf", decode_times=False)
+        tree = None
+        if ds.attrs.get("kind") == "spatial":
+            tree = xr.load_datatree(file, engine="h5netcdf", decode_times=False)
     except PermissionError:
         raise
     except (OSError, ValueError, KeyError, RuntimeError) as error:
@@ -301,7 +319,12 @@ def load(path: str | os.PathLike[str]) -> xr.Dataset:
             f"path = {str(path)!r}: was written by a newer version, {ds.attrs.get('source')}; "
             f"this is smolux {__version__}: pip install --upgrade smolux"
         )
-    ds.attrs = {k: v.item() if isinstance(v, np.generic) else v for k, v in ds.attrs.items()}
+    attributes = {k: v.item() if isinstance(v, np.generic) else v for k, v in ds.attrs.items()}
+    if tree is not None:
+        tree = tree.map_over_datasets(lambda node: node.drop_encoding())
+        tree.attrs = attributes
+        return tree
+    ds.attrs = attributes
     return ds.drop_encoding()
 
 

@@ -1,0 +1,1 @@
+"""The compiled part of the event-driven methods: geometry, grids, searches, replay."""

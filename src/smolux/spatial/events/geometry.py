@@ -1,0 +1,42 @@
+"""When two discs touch, and when a cluster touches a wall."""
+
+from __future__ import annotations
+
+import math
+
+from ...core.compile import piece
+
+#: a cluster that leaves less than this share of an axis free fills the box along it
+FILLED = 1e-12
+
+
+@piece
+def contact_time(a, b, c):
+    """Time to the contact of two discs; infinite if they miss each other.
+
+    With the separation d, the relative velocity w and the sum of radii s: ``a = |w|^2``,
+    ``b = d.w``, ``c = |d|^2 - s^2``. The root of ``a t^2 + 2 b t + c`` is taken in the form
+    without cancellation. Discs that touch and approach meet now; those that part never do.
+    """
+    if b >= 0.0:
+        return math.inf
+    if c <= 0.0:
+        return 0.0
+    square = b * b - a * c
+    return c / (math.sqrt(square) - b) if square >= 0.0 else math.inf
+
+
+@piece
+def wall_time(low, high, v, length):
+    """Time until what reaches from `low` to `high` touches a wall of an axis, if it moves there."""
+    if v > 0.0:
+        return max(length - high, 0.0) / v
+    if v < 0.0:
+        return max(low, 0.0) / -v
+    return math.inf
+
+
+@piece
+def shift(d, period):
+    """Return what makes a component of a separation that of the nearest image."""
+    return -period * math.floor(d / period + 0.5) if period > 0.0 else 0.0

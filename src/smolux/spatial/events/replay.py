@@ -1,0 +1,150 @@
+"""The motion, from the log alone: what any instant looked like, and what each merge was.
+
+Discs are nodes of a forest. The root of a tree carries velocity and displacement of a cluster, all
+others their displacement relative to the node above, which never changes. So a merge costs two
+walks to a root, at most ``log2 N`` steps each.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.compile import entry, piece
+from .geometry import shift
+
+
+class Forest(NamedTuple):
+    """Clusters as trees of discs."""
+
+    above: np.ndarray
+    offset: np.ndarray
+    velocity: np.ndarray
+    since: np.ndarray
+    mass: np.ndarray
+    size: np.ndarray
+    node: np.ndarray  # number of the cluster in the merger tree
+
+
+class Merges(NamedTuple):
+    """What each merge was."""
+
+    parents: np.ndarray
+    sizes: np.ndarray
+    masses: np.ndarray
+    point: np.ndarray
+    speed: np.ndarray
+    impact: np.ndarray
+    loss: np.ndarray
+    gap: np.ndarray
+
+
+@piece
+def find(forest, disc, total):
+    """Root of a disc's tree; writes the displacement relative to it."""
+    d = total.shape[0]
+    for k in range(d):
+        total[k] = 0.0
+    while forest.above[disc] != disc:
+        for k in range(d):
+            total[k] += forest.offset[disc, k]
+        disc = np.int64(forest.above[disc])
+    return disc
+
+
+@piece
+def bring(forest, root, time):
+    """Bring a cluster to a time."""
+    for k in range(forest.offset.shape[1]):
+        forest.offset[root, k] += forest.velocity[root, k] * (time - forest.since[root])
+    forest.since[root] = time
+
+
+@piece
+def describe(forest, merges, m, x, radius, period, ends, gap, a, b, work):
+    """Write down what a merge is, before it happens; the two discs touch at `ends`."""
+    i, j = ends
+    mu = forest.mass[a] * forest.mass[b] / (forest.mass[a] + forest.mass[b])
+    square, along, distance = 0.0, 0.0, 0.0
+    for k in range(x.shape[1]):
+        w = forest.velocity[b, k] - forest.velocity[a, k]
+        square += w * w
+        along += w * gap[k]
+        distance += gap[k] * gap[k]
+    distance = math.sqrt(distance)
+    share = radius[i] / (radius[i] + radius[j])
+    for k in range(x.shape[1]):
+        merges.point[m, k] = x[i, k] + work[0, k] + forest.offset[a, k] + share * gap[k]
+        if period[k] > 0.0:
+            merges.point[m, k] -= period[k] * math.floor(merges.point[m, k] / period[k])
+    merges.parents[m, 0], merges.parents[m, 1] = forest.node[a], forest.node[b]
+    merges.sizes[m, 0], merges.sizes[m, 1] = forest.size[a], forest.size[b]
+    merges.masses[m, 0], merges.masses[m, 1] = forest.mass[a], forest.mass[b]
+    merges.speed[m] = math.sqrt(square)
+    merges.impact[m] = math.sqrt(max(distance**2 - along**2 / square, 0.0)) if square > 0 else 0.0
+    merges.loss[m] = 0.5 * mu * square
+    merges.gap[m] = distance - radius[i] - radius[j]
+
+
+@piece
+def join(forest, a, b, image, work):
+    """Hang the smaller tree under the root of the larger one; return that root."""
+    sign = 1.0
+    if forest.size[b] > forest.size[a]:
+        a, b, sign = b, a, -1.0
+    ma, mb = forest.mass[a], forest.mass[b]
+    for k in range(forest.offset.shape[1]):
+        v = (ma * forest.velocity[a, k] + mb * forest.velocity[b, k]) / (ma + mb)
+        forest.velocity[a, k] = v
+        forest.offset[b, k] += sign * image[k] - forest.offset[a, k]
+    forest.mass[a] = ma + mb
+    forest.size[a] += forest.size[b]
+    forest.above[b] = a
+    return a
+
+
+@entry
+def replay(forest, merges, x, radius, period, time, first, second, start, stop, nodes, work):
+    """Go through events; return the number of nodes of the merger tree, `nodes` of them before."""
+    n, d = x.shape
+    gap, image = work[2], work[3]
+    for e in range(start, stop):
+        i, j = np.int64(first[e]), np.int64(second[e])
+        a = find(forest, i, work[0])
+        bring(forest, a, time[e])
+        if j < 0:
+            axis = (-1 - j) % d
+            forest.velocity[a, axis] *= 0.0 if -1 - j >= d else -1.0
+            continue
+        b = find(forest, j, work[1])
+        bring(forest, b, time[e])
+        for k in range(d):
+            one = x[i, k] + work[0, k] + forest.offset[a, k]
+            other = x[j, k] + work[1, k] + forest.offset[b, k]
+            image[k] = shift(other - one, period[k])
+            gap[k] = other - one + image[k]
+        describe(forest, merges, nodes - n, x, radius, period, (i, j), gap, a, b, work)
+        forest.node[join(forest, a, b, image, work)] = nodes
+        nodes += 1
+    return nodes
+
+
+@entry
+def positions(forest, x, time, out, velocity, label, work):
+    """Write position, velocity and cluster of all discs at a time; clusters by their least disc."""
+    n, d = x.shape
+    label[:] = -1
+    least = forest.node  # scratch: no use is made of the numbers after this
+    least[:] = -1
+    for i in range(n):
+        root = find(forest, i, work[0])
+        if least[root] < 0:
+            least[root] = i
+        label[i] = least[root]
+        for k in range(d):
+            v = forest.velocity[root, k]
+            shifted = forest.offset[root, k] + v * (time - forest.since[root])
+            out[i, k] = x[i, k] + work[0, k] + shifted
+            velocity[i, k] = v

@@ -1,0 +1,286 @@
+"""The spatial entry point: checks the arguments, drives the run in slices, makes the result."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError, Interrupted, did_you_mean
+from .method import Run, SpatialMethod
+from .methods import METHODS
+from .playing import narrate
+from .system import System
+from .trace import Trace, empty_series
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Float = NDArray[np.float64]
+
+#: events between two looks around, and output times if none are given
+_BUDGET = 1 << 16
+_TIMES = 100
+_TICK = 0.2
+
+
+@dataclass(frozen=True)
+class SpatialProgress:
+    """How far a run is.
+
+    Attributes
+    ----------
+    events : int
+        Merges and reflections so far, or steps.
+    clusters : int
+        Left.
+    time : float
+        Simulated so far.
+    fraction : float
+        Share of the merges that are wanted which is done, 0 to 1.
+    events_per_second : float
+    seconds_left : float
+        Not known: NaN.
+    compile_seconds : float
+        Until the first slice was done.
+    """
+
+    events: int
+    clusters: int
+    time: float
+    fraction: float
+    events_per_second: float
+    seconds_left: float
+    compile_seconds: float
+
+    @property
+    def note(self) -> str:
+        """For a bar: the clusters left."""
+        return f"{self.clusters} clusters left"
+
+
+def simulate(
+    system: System,
+    method: str | SpatialMethod = "windowed",
+    *,
+    until: float | None = None,
+    clusters: int = 1,
+    times: ArrayLike | None = None,
+    max_events: int | None = None,
+    time_limit: float | None = None,
+    progress: Callable[[SpatialProgress], None] | None = None,
+) -> xr.DataTree:
+    """Let discs fly and stick until few clusters are left.
+
+    Parameters
+    ----------
+    system : System
+        Where the discs are and how they move.
+    method : str or SpatialMethod
+        See `smolux.spatial.METHODS`.
+    until : float, optional
+        Time at which to stop, however many clusters are left.
+    clusters : int
+        Stop when so few clusters are left.
+    times : array_like of shape (T,), optional
+        Output times of the series, ascending. If left out, 100 of them, geometrically spaced over
+        the time in which the discs merge; methods that take steps need them.
+    max_events : int, optional
+        Stop after so many merges and reflections, or steps.
+    time_limit : float, optional
+        Stop after so many seconds of wall time.
+    progress : callable, optional
+        Called with a `SpatialProgress` a few times a second.
+
+    Returns
+    -------
+    xarray.DataTree
+        The discs at the end and, in groups, ``series`` over time and all that happened, ``events``
+        (the merger tree) and ``walls``. `replay` gives any instant of it.
+
+    Raises
+    ------
+    InputError
+        With every mistake in the arguments.
+    Interrupted
+        On Ctrl-C; holds the result of what was reached.
+
+    Notes
+    -----
+    A run that stops before its goal says why, in the attribute ``stopped`` and in its warnings.
+
+    References
+    ----------
+    P. Degond, G. Dimarco, M. Ferreira, S. Hecht.
+
+    Examples
+    --------
+    >>> import smolux as sx
+    >>> system = sx.spatial.lattice(100, 0.1, seed=1)
+    >>> result = sx.spatial.simulate(system)
+    >>> result["events"].sizes["event"]
+    99
+    """
+    chosen, output = _checked(
+        system, method, until, clusters, times, max_events, time_limit, progress
+    )
+    started = clock.perf_counter()
+    run = chosen.start(system, np.empty(0) if output is None else output)
+    driver = _Driver(run, len(system), clusters, started, progress)
+    limit = np.inf if time_limit is None else time_limit
+    most = np.inf if max_events is None else max_events
+    try:
+        stopped = driver.drive(np.inf if until is None else float(until), most, limit)
+    except KeyboardInterrupt:
+        driver.interrupted = True
+        stopped = "interrupted"
+    trace = run.trace()
+    trace.stopped = trace.stopped or stopped
+    wall = clock.perf_counter() - started
+    tree = _result(system, chosen, trace, output, wall, driver.compile_seconds)
+    if driver.interrupted:
+        raise Interrupted(f"stopped with {run.clusters} clusters left", tree)
+    return tree
+
+
+class _Driver:
+    """Calls a run slice by slice."""
+
+    def __init__(self, run: Run, discs: int, target: int, started: float, progress: Any) -> None:
+        self.run, self.discs, self.target = run, discs, target
+        self.started, self.progress = started, progress
+        self.compile_seconds = 0.0
+        self.interrupted = False
+
+    def drive(self, until: float, most: float, limit: float) -> str:
+        """Go on to the end; return why it was not the goal, or nothing."""
+        told = self.started
+        while True:
+            budget = int(min(_BUDGET, most - self.run.events))
+            if budget <= 0:
+                return f"the limit of {most:g} events is reached"
+            code = self.run.advance(until, self.target, budget)
+            now = clock.perf_counter()
+            if not self.compile_seconds:
+                self.compile_seconds = now - self.started
+            if code is not None:
+                self._tell(now)
+                return code
+            if now - self.started > limit:
+                return f"the time limit of {limit:g} s is reached"
+            if now - told > _TICK:
+                told = now
+                self._tell(now)
+
+    def _tell(self, now: float) -> None:
+        if self.progress is None:
+            return
+        run, wanted = self.run, max(self.discs - self.target, 1)
+        done = min((self.discs - run.clusters) / wanted, 1.0)
+        self.progress(
+            SpatialProgress(
+                run.events, run.clusters, run.time, done, run.events / (now - self.started),
+                np.nan, self.compile_seconds,
+            )
+        )  # fmt: skip
+
+
+def _checked(
+    system: Any, method: Any, until: Any, clusters: Any, times: Any, max_events: Any,
+    time_limit: Any, progress: Any,
+) -> tuple[SpatialMethod, Float | None]:  # fmt: skip
+    problems: list[str] = []
+    if not isinstance(system, System):
+        problems.append(
+            f"system = {system!r}: must be a smolux.spatial.System, or made by lattice or random"
+        )
+    chosen = _method(method, problems)
+    for name, value in (("until", until), ("time_limit", time_limit), ("max_events", max_events)):
+        if value is not None and not (_number(value) and value > 0):
+            problems.append(f"{name} = {value!r}: must be a positive number, or left out")
+    if not (_number(clusters) and clusters == int(clusters) and clusters >= 1):
+        problems.append(f"clusters = {clusters!r}: must be a whole number, one or more")
+    if progress is not None and not callable(progress):
+        problems.append(f"progress = {progress!r}: must be a function of a SpatialProgress")
+    output = _times(times, chosen, problems)
+    if problems:
+        raise InputError(problems)
+    return chosen, output
+
+
+def _method(method: Any, problems: list[str]) -> Any:
+    if isinstance(method, str):
+        found = [m for m in METHODS if m.name == method]
+        if found:
+            return found[0]()
+        near = did_you_mean(method, [m.name for m in METHODS])
+        problems.append(f"method = {method!r}: unknown{near}")
+    elif not isinstance(method, SpatialMethod):
+        problems.append(f"method = {method!r}: must be a name or one of smolux.spatial.METHODS")
+    return method
+
+
+def _times(times: Any, method: Any, problems: list[str]) -> Float | None:
+    if times is None:
+        if isinstance(method, SpatialMethod) and not method.exact:
+            problems.append(f"times: the method {method.name!r} takes steps; say when to observe")
+        return None
+    try:
+        output = np.atleast_1d(np.asarray(times, float))
+        good = output.ndim == 1 and bool((np.isfinite(output) & (output >= 0)).all())
+    except (TypeError, ValueError):
+        good = False
+    if not good:
+        problems.append(f"times = {times!r}: must be finite numbers, zero or more")
+        return None
+    if (np.diff(output) <= 0).any():
+        problems.append(f"times = {times!r}: must ascend")
+    return output
+
+
+def _number(value: Any) -> bool:
+    real = isinstance(value, (int, float, np.number)) and not isinstance(value, (bool, np.bool_))
+    return real and bool(np.isfinite(value))
+
+
+def _default_times(trace: Trace) -> Float:
+    """Choose times from well before the first merge to the end."""
+    merges = trace.log.time[trace.log.merges]
+    last = trace.time
+    if not last > 0:
+        return np.zeros(1)
+    first = merges[len(merges) // 100] if len(merges) else last
+    start = min(max(first, 1e-6 * last) / 10, last / 2)
+    inner = np.geomspace(start, last, _TIMES - 1)
+    inner[-1] = last
+    return np.concatenate(([0.0], inner))
+
+
+def _result(
+    system: System,
+    method: SpatialMethod,
+    trace: Trace,
+    output: Float | None,
+    wall: float,
+    compiling: float,
+) -> xr.DataTree:
+    from .result import to_tree
+
+    times = _default_times(trace) if output is None else output
+    merging, series = None, trace.series
+    if method.exact:
+        merging, series = narrate(system, trace.log, times, trace.time)
+    elif series is None:
+        series = empty_series(times, len(system), system.dimension)
+    attributes = {
+        "method": method.name,
+        "method_settings": vars(method),
+        "wall_seconds": wall,
+        "first_slice_seconds": compiling,
+        **trace.attributes,
+    }
+    return to_tree(system, trace, series, merging, attributes)
