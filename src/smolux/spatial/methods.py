@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .direct import AllPairs, Cells
 from .method import SpatialMethod
+from .windowed import Windowed
 
 #: every method
-METHODS: tuple[type[SpatialMethod], ...] = (Cells, AllPairs)
+METHODS: tuple[type[SpatialMethod], ...] = (Windowed, Cells, AllPairs)

@@ -1,0 +1,125 @@
+"""The state of the windowed method: discs in blocks, blocks in clusters, pairs, a heap of events.
+
+A *block* is a few neighbouring discs of one cluster, or one disc. Where a disc is at a time t::
+
+    rel[disc] + place[block] + body[cluster, :d] + body[cluster, d:2 d] * (t - since)
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+# Entries of Flight.clock.
+TIME = 0
+LATEST = 1  # time of the latest merge
+SCALE = 2  # largest speed at the start
+SKIN = 3  # pairs whose surfaces are nearer than this are listed
+BUDGET_OF_WAY = 4  # how far a cluster may move before it is listed anew: half of the skin
+WINDOW = 5  # end of the window
+WIDEST = 6  # largest diameter
+LONGEST = 7  # longest side of the box
+THICKEST = 8  # the skin is at most this thick
+CLOCKS = 9
+
+# Entries of Flight.count.
+CLUSTERS = 0
+SPREAD = 1  # 0 if all radii are equal: then only one is stored
+FREE = 2  # first free pair
+USED = 3  # pairs that were ever used
+PAIRS = 4  # pairs listed now
+HEAP = 5  # entries of the heap
+FULL = 6  # what there is no room for: PAIR or EVENT
+BATCH = 7  # number of the latest listing of some clusters
+WINDOWS = 8
+LISTED = 9  # blocks listed
+CHECKED = 10  # pairs of blocks and of discs looked at
+PREDICTED = 11  # contacts predicted
+REBUILT = 12  # listings of everything at once
+RELABELLED = 13  # blocks that changed their cluster
+MARK_LISTED = 14  # the same when the skin was last judged
+MARK_CHECKED = 15
+MARK_PREDICTED = 16
+COUNTS = 17
+
+# Columns of Flight.body after displacement and velocity, which take 2 d.
+SINCE = 0  # time of the displacement
+MASS = 1  # 0: merged into another one
+WAY = 2  # moved since it was listed
+HORIZON = 3  # until when contacts are predicted
+BODY = 4
+
+# Values of count[FULL].
+PAIR, EVENT = 1, 2
+
+# Why the loop returned.
+DONE = 0
+BUDGET = 1
+AT_REST = 2
+LONELY = 3
+NO_PAIRS = 4  # no room for pairs
+NO_EVENTS = 5  # no room for events
+RESKIN = 6  # another skin would be better: clock[SKIN] holds it
+
+
+# Columns of Flight.disc.
+NAME, BLOCK = 0, 1
+
+# Columns of Flight.block: first disc, cluster, next block of the cluster, cell, next block of it.
+FIRST, CLUSTER, CHAIN, CELL, NEXT = 0, 1, 2, 3, 4
+BLOCK_COLUMNS = 5
+
+# Columns of Flight.group: first and last block, number of blocks and of discs, first and last
+# half-edge, number of the latest state, and of the batch: 2 n to be listed in batch n, 2 n + 1 done.
+START, END, BLOCKS, DISCS, EDGE, LAST_EDGE, STAMP, LISTED_IN = 0, 1, 2, 3, 4, 5, 6, 7
+GROUP_COLUMNS = 8
+
+# Columns of Flight.pair, Flight.link and Flight.event. Half-edge 2 p is that of ONE of pair p,
+# 2 p + 1 that of TWO. An event is that of a pair, or -1 - the number of a cluster; it is out of
+# date unless WHICH is the version of the pair or the state of the cluster.
+ONE, TWO, VERSION = 0, 1, 2
+BEFORE, AFTER = 0, 1
+WHAT, WHICH = 0, 1
+
+
+class Flight(NamedTuple):
+    """All clusters on their way.
+
+    Attributes
+    ----------
+    clock, count : of shape (CLOCKS,), (COUNTS,)
+    length, period, cells : of shape (d,)
+        The box, and the number of cells along each axis.
+    rel, radius, disc : of shape (N, d), (N,) or (1,), (N, 2)
+        Discs, in the order of space.
+    block, place, half : of shape (B + 1, 5), (B, d), (B, d)
+        Blocks; half the extension of their centres.
+    head : of shape (C,)
+        First block of each cell.
+    body, bound, group : of shape (G, 2 d + 4), (G, 2 d), (G, 8)
+        Clusters; their lower and upper bounds, less the displacement.
+    pair, link : of shape (P, 3), (2 P, 2)
+    when, event : of shape (E,), (E, 2)
+        The heap.
+    """
+
+    clock: np.ndarray
+    count: np.ndarray  # type: ignore[assignment]
+    length: np.ndarray
+    period: np.ndarray
+    cells: np.ndarray
+    rel: np.ndarray
+    radius: np.ndarray
+    disc: np.ndarray
+    block: np.ndarray
+    place: np.ndarray
+    half: np.ndarray
+    head: np.ndarray
+    body: np.ndarray
+    bound: np.ndarray
+    group: np.ndarray
+    pair: np.ndarray
+    link: np.ndarray
+    when: np.ndarray
+    event: np.ndarray

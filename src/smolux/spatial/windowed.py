@@ -1,0 +1,261 @@
+"""The windowed method: exact, and at a cost that hardly grows with the number of discs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .eventlog import Logger, reasons
+from .method import Run, SpatialMethod
+from .overlaps import cells_for
+from .system import System
+from .trace import Trace
+
+Float = NDArray[np.float64]
+
+_ROOM = 1 << 16
+#: the skin at the start in mean distances of discs, and its least in diameters: below it room is made
+_SKIN, _THIN = 0.6, 1e-3
+#: room for pairs and for events at the start, by disc
+_PAIRS, _EVENTS = 2.5, 3.0
+#: discs of one cluster share a block from this mean size on
+_BLOCKS_FROM = 4.0
+
+
+@cache
+def _loop(dimension: int) -> Callable[..., Any]:
+    from .events import windows
+
+    return windows.bind(dimension)
+
+
+@dataclass
+class _State:
+    """What survives when discs are put into blocks anew: clusters as arrays by cluster."""
+
+    x: Float
+    names: NDArray[np.int32]
+    label: NDArray[np.int32]
+    velocity: Float
+    mass: Float
+    bound: Float
+
+
+class WindowedRun(Run):
+    """A run of the windowed method."""
+
+    def __init__(self, system: System, settings: Windowed) -> None:
+        from .events import direct, flight, packing
+
+        self.system, self.settings = system, settings
+        self._flight, self._packing, self._events = flight, packing, direct.Events
+        n, d = system.position.shape
+        self._loop = _loop(d)
+        self.logger = Logger(min(_ROOM, 16 * n + 16))
+        self.work = np.zeros((4, d))
+        box, widest = system.box, 2 * float(system.radius.max())
+        thickest = max(box.lengths) / 4
+        for side, periodic in zip(box.lengths, box.periodic, strict=True):
+            if periodic:  # no pair may come within reach of two images of each other
+                thickest = min(thickest, 0.49 * (side / 2 - widest))
+        self._room = [int(_PAIRS * n) + 64, int(_EVENTS * n) + 64]
+        self.count = np.zeros(flight.COUNTS, np.int64)
+        self.count[flight.CLUSTERS] = n
+        self.count[flight.SPREAD] = 0 if system.monodisperse else 1
+        self.clock = np.zeros(flight.CLOCKS)
+        self.clock[flight.SCALE] = float(np.sqrt((system.velocity**2).sum(1).max()))
+        self.clock[flight.WIDEST], self.clock[flight.LONGEST] = widest, max(box.lengths)
+        self.clock[flight.THICKEST] = thickest
+        spacing = (box.volume / n) ** (1 / d)
+        self.clock[flight.SKIN] = min(settings.skin or _SKIN * spacing, thickest)
+        room = system.radius if system.wall_contact == "surface" else np.zeros(n)
+        everyone = np.arange(n, dtype=np.int32)
+        self.flight = self._packed(
+            _State(
+                system.position, everyone, everyone, system.velocity, system.mass,
+                np.hstack([system.position - room[:, None], system.position + room[:, None]]),
+            )
+        )  # fmt: skip
+
+    def _packed(self, state: _State) -> Any:
+        """Return a flight with discs in the order of space, in blocks; nothing is listed yet."""
+        system, clock, count, flight = self.system, self.clock, self.count, self._flight
+        n, d = state.x.shape
+        skin = float(clock[flight.SKIN])
+        length, period = np.array(system.box.lengths), system.box.periods
+        together = n >= _BLOCKS_FROM * count[flight.CLUSTERS]
+        span = skin / 2 if together else -1.0
+        cells = cells_for(system.box, skin / 2 if together else 0.0, n)
+        counts = np.empty(int(np.prod(cells)) + 1, np.int32)
+        perm, opens = np.empty(n, np.int32), np.empty(n, np.bool_)
+        blocks = self._packing.order(
+            state.x, state.label, length, period, cells, span, counts, perm, opens
+        )
+        del counts
+        clusters = int(count[flight.CLUSTERS])
+        f = self._empty(n, blocks, clusters)
+        new = np.full(len(state.mass), -1, np.int32)
+        self._packing.pack(f, state.x, state.label, state.names, perm, opens, new)
+        if count[flight.SPREAD]:
+            f.radius[:] = system.radius[f.disc[:, flight.NAME]]
+        old = np.flatnonzero(new >= 0)
+        to = new[old]
+        f.body[to, d : 2 * d] = state.velocity[old]
+        f.body[to, 2 * d + flight.SINCE] = clock[flight.TIME]
+        f.body[to, 2 * d + flight.MASS] = state.mass[old]
+        f.body[to, 2 * d + flight.WAY] = np.inf
+        f.bound[to] = state.bound[old]
+        return self._gridded(f)
+
+    def _empty(self, n: int, blocks: int, clusters: int) -> Any:
+        flight, d, small = self._flight, self.system.dimension, np.int32
+        pairs, events = self._room
+        return flight.Flight(
+            clock=self.clock,
+            count=self.count,
+            length=np.array(self.system.box.lengths),
+            period=self.system.box.periods,
+            cells=np.ones(d, np.int64),
+            rel=np.empty((n, d)),
+            radius=np.full(n if self.count[flight.SPREAD] else 1, self.system.radius[0]),
+            disc=np.empty((n, 2), small),
+            block=np.zeros((blocks + 1, flight.BLOCK_COLUMNS), small),
+            place=np.empty((blocks, d)),
+            half=np.empty((blocks, d), np.float32),
+            head=np.empty(0, small),
+            body=np.zeros((clusters, 2 * d + flight.BODY)),
+            bound=np.empty((clusters, 2 * d)),
+            group=np.zeros((clusters, flight.GROUP_COLUMNS), small),
+            pair=np.zeros((pairs, 3), small),
+            link=np.empty((2 * pairs, 2), small),
+            when=np.empty(events),
+            event=np.empty((events, 2), small),
+        )
+
+    def _gridded(self, f: Any) -> Any:
+        """Lay a grid for the skin: a block and all that it may be listed with are neighbours."""
+        flight = self._flight
+        skin = float(self.clock[flight.SKIN])
+        # the other one may have moved half a skin since it was binned
+        side = 2 * float(f.half.max()) + float(self.clock[flight.WIDEST]) + 1.5 * skin
+        cells = cells_for(self.system.box, side * (1 + 1e-6), len(f.rel))
+        self.clock[flight.BUDGET_OF_WAY] = skin / 2 * (1 - 1e-6)
+        self.clock[flight.WINDOW] = -1.0
+        self.count[flight.FULL] = 0
+        for mark, of in (
+            (flight.MARK_LISTED, flight.LISTED),
+            (flight.MARK_CHECKED, flight.CHECKED),
+            (flight.MARK_PREDICTED, flight.PREDICTED),
+        ):
+            self.count[mark] = self.count[of]
+        return f._replace(cells=cells, head=np.full(int(np.prod(cells)), -1, np.int32))
+
+    def _repack(self) -> None:
+        f, flight, d = self.flight, self._flight, self.system.dimension
+        t = float(self.clock[flight.TIME])
+        x = np.empty_like(f.rel)
+        self._packing.positions(f, t, x)
+        velocity = f.body[:, d : 2 * d]
+        moved = f.body[:, :d] + velocity * (t - f.body[:, 2 * d + flight.SINCE])[:, None]
+        state = _State(
+            x,
+            f.disc[:, flight.NAME],
+            f.block[f.disc[:, flight.BLOCK], flight.CLUSTER],
+            velocity,
+            f.body[:, 2 * d + flight.MASS],
+            f.bound + np.hstack([moved, moved]),
+        )
+        del f, self.flight
+        self.flight = self._packed(state)
+
+    def _recover(self, code: int) -> None:
+        """Make the skin thinner, or room, when something was full."""
+        flight = self._flight
+        if code == flight.NO_PAIRS:
+            if self.clock[flight.SKIN] > _THIN * self.clock[flight.WIDEST]:
+                self.clock[flight.SKIN] /= 2
+            else:
+                self._room[0] *= 2
+        elif code == flight.NO_EVENTS:
+            self._room[1] *= 2
+        self._repack()
+
+    @property
+    def time(self) -> float:  # type: ignore[override]
+        """See `Run`."""
+        return float(self.clock[self._flight.TIME])
+
+    @property
+    def clusters(self) -> int:  # type: ignore[override]
+        """See `Run`."""
+        return int(self.count[self._flight.CLUSTERS])
+
+    @property
+    def events(self) -> int:  # type: ignore[override]
+        """See `Run`."""
+        return self.logger.events
+
+    def advance(self, until: float, clusters: int, budget: int) -> str | None:
+        """See `Run.advance`."""
+        flight = self._flight
+        code, done = self._loop(
+            self.flight, self._events(*self.logger.room), until, clusters,
+            self.settings.patience, budget, self.work,
+        )  # fmt: skip
+        self.logger.keep(done)
+        if code in (flight.NO_PAIRS, flight.NO_EVENTS, flight.RESKIN):
+            self._recover(code)
+        return "" if code == flight.DONE else reasons(flight).get(code)
+
+    def trace(self) -> Trace:
+        """See `Run.trace`."""
+        f, flight, d = self.flight, self._flight, self.system.dimension
+        name = f.disc[:, flight.NAME]
+        own = f.block[f.disc[:, flight.BLOCK], flight.CLUSTER]
+        now, x, v = (np.empty_like(f.rel) for _ in range(3))
+        self._packing.positions(f, self.time, now)
+        x[name], v[name] = now, f.body[own, d : 2 * d]
+        least = np.full(len(f.body), len(x), np.int32)
+        np.minimum.at(least, own, name)
+        label = np.empty(len(x), np.int32)
+        label[name] = least[own]
+        counters = {
+            "windows": "WINDOWS", "listings_of_blocks": "LISTED", "distances": "CHECKED",
+            "predictions": "PREDICTED", "relabelled_blocks": "RELABELLED", "full_listings": "REBUILT",
+        }  # fmt: skip
+        attributes = {key: int(self.count[getattr(flight, c)]) for key, c in counters.items()}
+        return Trace(self.time, x, v, label, self.logger.log(), attributes=attributes)
+
+
+@dataclass(frozen=True)
+class Windowed(SpatialMethod):
+    """Pairs that may meet are listed for a window of time; the default.
+
+    Pairs of discs nearer than a skin are listed, and their contacts predicted. No other pair can
+    meet before a cluster has moved half a skin, so the method is exact: it makes the same merges at
+    the same times as a search over all pairs. Clusters that move fast are listed often, slow ones
+    seldom; the skin grows with the clusters, so that listing and predicting cost the same.
+
+    Parameters
+    ----------
+    patience : float
+        The run ends when there was no merge while the fastest cluster would have crossed the box
+        so many times.
+    skin : float, optional
+        Skin at the start; 0.6 times the mean distance of the discs if left out.
+    """
+
+    patience: float = 1e4
+    skin: float | None = field(default=None)
+    name: ClassVar[str] = "windowed"
+    title: ClassVar[str] = "pairs that may meet within a window of time"
+    reference: ClassVar[str] = "this package; see the theory of ballistic aggregation"
+
+    def start(self, system: System, times: Float) -> Run:
+        """See `SpatialMethod.start`."""
+        return WindowedRun(system, self)
