@@ -57,7 +57,7 @@ class WindowedRun(Run):
         n, d = system.position.shape
         self._loop = _loop(d)
         self.logger = Logger(min(_ROOM, 16 * n + 16))
-        self.work = np.zeros((4, d))
+        self.work, self.near = np.zeros((4, d)), np.zeros((3, 3), np.int64)
         box, widest = system.box, 2 * float(system.radius.max())
         thickest = max(box.lengths) / 4
         for side, periodic in zip(box.lengths, box.periodic, strict=True):
@@ -205,7 +205,7 @@ class WindowedRun(Run):
         flight = self._flight
         code, done = self._loop(
             self.flight, self._events(*self.logger.room), until, clusters,
-            self.settings.patience, budget, self.work,
+            self.settings.patience, budget, self.work, self.near,
         )  # fmt: skip
         self.logger.keep(done)
         if code in (flight.NO_PAIRS, flight.NO_EVENTS, flight.RESKIN):

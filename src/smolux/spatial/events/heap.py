@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...core.compile import cold_piece, piece
 from .flight import (
     EVENT,
@@ -15,16 +17,19 @@ from .flight import (
     WHAT,
     WHICH,
 )
+from .geometry import larger, smaller
 
 
 @cold_piece
 def earlier_of_equals(f, a, b):
     """Which of two events at one time comes first: contacts by their discs, then reflections."""
+    disc, pair = f.disc, f.pair
     if a < 0 or b < 0:
         return a > b
-    i, j = f.disc[f.pair[a, ONE], NAME], f.disc[f.pair[a, TWO], NAME]
-    k, m = f.disc[f.pair[b, ONE], NAME], f.disc[f.pair[b, TWO], NAME]
-    return (min(i, j), max(i, j)) < (min(k, m), max(k, m))
+    i, j = disc[pair[a, ONE], NAME], disc[pair[a, TWO], NAME]
+    k, m = disc[pair[b, ONE], NAME], disc[pair[b, TWO], NAME]
+    low, other = smaller(i, j), smaller(k, m)
+    return low < other or (low == other and larger(i, j) < larger(k, m))
 
 
 @piece
@@ -36,24 +41,25 @@ def precedes(f, t, a, u, b):
 @piece
 def sift_down(f, k, n, t, what, which):
     """Put an event into the heap at place `k` or below."""
+    when, event = f.when, f.event
     while True:
         child = 2 * k + 1
         if child >= n:
             break
         right = child + 1
         if right < n and precedes(
-            f, f.when[right], f.event[right, WHAT], f.when[child], f.event[child, WHAT]
+            f, when[right], event[right, WHAT], when[child], event[child, WHAT]
         ):
             child = right
-        if not precedes(f, f.when[child], f.event[child, WHAT], t, what):
+        if not precedes(f, when[child], event[child, WHAT], t, what):
             break
-        f.when[k], f.event[k, WHAT], f.event[k, WHICH] = (
-            f.when[child],
-            f.event[child, WHAT],
-            f.event[child, WHICH],
+        when[k], event[k, WHAT], event[k, WHICH] = (
+            when[child],
+            event[child, WHAT],
+            event[child, WHICH],
         )
         k = child
-    f.when[k], f.event[k, WHAT], f.event[k, WHICH] = t, what, which
+    when[k], event[k, WHAT], event[k, WHICH] = t, what, which
 
 
 @piece
@@ -65,48 +71,52 @@ def is_current(f, what, which):
 @cold_piece
 def compact(f):
     """Throw out what is out of date; ask for more room if that does not free a quarter."""
+    event, when, count = f.event, f.when, f.count
     kept = 0
-    for k in range(f.count[HEAP]):
-        if is_current(f, f.event[k, WHAT], f.event[k, WHICH]):
-            f.when[kept], f.event[kept, WHAT], f.event[kept, WHICH] = (
-                f.when[k],
-                f.event[k, WHAT],
-                f.event[k, WHICH],
+    for k in range(count[HEAP]):
+        if is_current(f, np.int64(event[k, WHAT]), event[k, WHICH]):
+            when[kept], event[kept, WHAT], event[kept, WHICH] = (
+                when[k],
+                event[k, WHAT],
+                event[k, WHICH],
             )
             kept += 1
     for k in range(kept // 2 - 1, -1, -1):
-        sift_down(f, k, kept, f.when[k], f.event[k, WHAT], f.event[k, WHICH])
-    f.count[HEAP] = kept
-    if 4 * kept > 3 * f.when.shape[0]:
-        f.count[FULL] = EVENT
+        sift_down(f, k, kept, when[k], event[k, WHAT], event[k, WHICH])
+    count[HEAP] = kept
+    if 4 * kept > 3 * when.shape[0]:
+        count[FULL] = EVENT
 
 
 @piece
-def push(f, t, what, which):
+def push(f, t, number, which):
     """Add an event."""
-    if f.count[HEAP] == f.when.shape[0]:
+    when, event, count = f.when, f.event, f.count
+    what = np.int32(number)
+    if count[HEAP] == when.shape[0]:
         compact(f)
-        if f.count[FULL]:
+        if count[FULL]:
             return
-    k = f.count[HEAP]
-    f.count[HEAP] = k + 1
+    k = count[HEAP]
+    count[HEAP] = k + 1
     while k > 0:
         up = (k - 1) // 2
-        if not precedes(f, t, what, f.when[up], f.event[up, WHAT]):
+        if not precedes(f, t, what, when[up], event[up, WHAT]):
             break
-        f.when[k], f.event[k, WHAT], f.event[k, WHICH] = (
-            f.when[up],
-            f.event[up, WHAT],
-            f.event[up, WHICH],
+        when[k], event[k, WHAT], event[k, WHICH] = (
+            when[up],
+            event[up, WHAT],
+            event[up, WHICH],
         )
         k = up
-    f.when[k], f.event[k, WHAT], f.event[k, WHICH] = t, what, which
+    when[k], event[k, WHAT], event[k, WHICH] = t, what, which
 
 
 @piece
 def pop(f):
     """Take out the first event, which the caller has read."""
+    event = f.event
     n = f.count[HEAP] - 1
     f.count[HEAP] = n
     if n > 0:
-        sift_down(f, 0, n, f.when[n], f.event[n, WHAT], f.event[n, WHICH])
+        sift_down(f, np.int64(0), n, f.when[n], event[n, WHAT], event[n, WHICH])

@@ -29,11 +29,12 @@ from .flight import (
     SINCE,
     SKIN,
     SPREAD,
+    START,
     USED,
     WAY,
     WIDEST,
 )
-from .geometry import shift
+from .geometry import larger, shift, smaller
 from .pairs import add
 
 
@@ -43,21 +44,23 @@ def bind(d):
     @piece
     def centre(f, b, k, t):
         """Component of the centre of a block at a time."""
+        body = f.body
         c = f.block[b, CLUSTER]
-        moved = f.body[c, k] + f.body[c, d + k] * (t - f.body[c, 2 * d + SINCE])
+        moved = body[c, k] + body[c, d + k] * (t - body[c, 2 * d + SINCE])
         return f.place[b, k] + moved
 
     @piece
     def bring(f, c, t):
         """Bring a cluster to a time."""
-        dt = t - f.body[c, 2 * d + SINCE]
+        body = f.body
+        dt = t - body[c, 2 * d + SINCE]
         square = 0.0
         for k in range(d):
-            v = f.body[c, d + k]
-            f.body[c, k] += v * dt
+            v = body[c, d + k]
+            body[c, k] += v * dt
             square += v * v
-        f.body[c, 2 * d + WAY] += math.sqrt(square) * dt
-        f.body[c, 2 * d + SINCE] = t
+        body[c, 2 * d + WAY] += math.sqrt(square) * dt
+        body[c, 2 * d + SINCE] = t
 
     @piece
     def cell_at(f, b, t):
@@ -67,142 +70,171 @@ def bind(d):
             x, length, n = centre(f, b, k, t), f.length[k], f.cells[k]
             if f.period[k] > 0.0:
                 x -= length * math.floor(x / length)
-            cell = cell * n + min(max(np.int64(x / length * n), 0), n - 1)
+            cell = cell * n + smaller(larger(np.int64(x / length * n), 0), n - 1)
         return cell
 
     @piece
     def insert(f, b, cell):
         """Put a block into a cell."""
-        f.block[b, CELL] = cell
-        f.block[b, NEXT] = f.head[cell]
-        f.head[cell] = b
+        block, head = f.block, f.head
+        block[b, CELL] = cell
+        block[b, NEXT] = head[cell]
+        head[cell] = b
 
     @piece
     def rebin(f, b, t):
         """Put a block into the cell where it is now."""
-        cell, old = cell_at(f, b, t), f.block[b, CELL]
+        head, block = f.head, f.block
+        cell, old = cell_at(f, b, t), block[b, CELL]
         if cell == old:
             return
-        q = f.head[old]
+        q = head[old]
         if q == b:
-            f.head[old] = f.block[b, NEXT]
+            head[old] = block[b, NEXT]
         else:
-            while f.block[q, NEXT] != b:
-                q = f.block[q, NEXT]
-            f.block[q, NEXT] = f.block[b, NEXT]
-        insert(f, b, cell)
+            while block[q, NEXT] != b:
+                q = block[q, NEXT]
+            block[q, NEXT] = block[b, NEXT]
+        insert(f, np.int64(b), cell)
 
     @piece
     def list_discs(f, b, q, dx):
         """List the pairs of discs of two blocks that are nearer than a skin."""
-        a, c = f.block[b, CLUSTER], f.block[q, CLUSTER]
+        block, rel, radius = f.block, f.rel, f.radius
+        a, c = block[b, CLUSTER], block[q, CLUSTER]
         spread = f.count[SPREAD]
-        for i in range(f.block[b, FIRST], f.block[b + 1, FIRST]):
-            for j in range(f.block[q, FIRST], f.block[q + 1, FIRST]):
+        for i in range(block[b, FIRST], block[b + 1, FIRST]):
+            for j in range(block[q, FIRST], block[q + 1, FIRST]):
                 square = 0.0
                 for k in range(d):
-                    x = dx[k] + f.rel[j, k] - f.rel[i, k]
+                    x = dx[k] + rel[j, k] - rel[i, k]
                     x += shift(x, f.period[k])
                     square += x * x
-                near = f.radius[i * spread] + f.radius[j * spread] + f.clock[SKIN]
+                near = radius[i * spread] + radius[j * spread] + f.clock[SKIN]
                 if square < near * near:
                     add(f, i, j, a, c)
-        f.count[CHECKED] += (f.block[b + 1, FIRST] - f.block[b, FIRST]) * (
-            f.block[q + 1, FIRST] - f.block[q, FIRST]
+        f.count[CHECKED] += (block[b + 1, FIRST] - block[b, FIRST]) * (
+            block[q + 1, FIRST] - block[q, FIRST]
         )
 
     @piece
-    def look(f, b, q, t, x, dx, reach):
-        """List the pairs of two blocks, unless all are too far."""
+    def look(f, b, q, t, still, x, dx, reach):
+        """List the pairs of two blocks, unless all are too far; a `still` one is at its place."""
+        half = f.half
         square = 0.0
         for k in range(d):
-            dx[k] = centre(f, q, k, t) - x[k]
+            dx[k] = (f.place[q, k] if still else centre(f, q, k, t)) - x[k]
             gap = dx[k] + shift(dx[k], f.period[k])
-            gap = max(abs(gap) - f.half[b, k] - f.half[q, k], 0.0)
+            gap = larger(abs(gap) - half[b, k] - half[q, k], 0.0)
             square += gap * gap
-        f.count[CHECKED] += 1
         if square < reach * reach:
             list_discs(f, b, q, dx)
 
     @piece
-    def search(f, b, t, batch, work):
+    def around(f, b, axis, near):
+        """Write the places along an axis of the cells around that of a block; return how many.
+
+        Along a periodic axis of one or two cells, neighbours on both sides are the same cell.
+        """
+        cells = f.cells
+        rest, stride = f.block[b, CELL], 1
+        for m in range(d - 1, axis, -1):
+            rest //= cells[m]
+            stride *= cells[m]
+        n = cells[axis]
+        at = rest % n
+        count = 0
+        for step in range(-1, 2):
+            to = at + step
+            if f.period[axis] > 0.0:
+                if (n == 1 and step != 0) or (n == 2 and step < 0):
+                    continue
+                to = to + n if to < 0 else to - n if to >= n else to
+            elif to < 0 or to >= n:
+                continue
+            near[axis, count] = to * stride
+            count += 1
+        return count
+
+    @piece
+    def search(f, b, t, batch, work, near):
         """List pairs of a block with those of other clusters, except of those listed in a batch."""
+        block = f.block
         x, dx = work[0], work[1]
-        own = f.block[b, CLUSTER]
+        own = block[b, CLUSTER]
         reach = f.clock[WIDEST] + f.clock[SKIN]
+        still = batch == 0
         for k in range(d):
             x[k] = centre(f, b, k, t)
+        rows = around(f, b, np.int64(0), near)
+        columns = around(f, b, np.int64(1), near)
+        layers = around(f, b, np.int64(2), near) if d == 3 else 1
+        checked = 0
+        for one in range(rows):
+            for two in range(columns):
+                for three in range(layers):
+                    cell = near[0, one] + near[1, two]
+                    if d == 3:
+                        cell += near[2, three]
+                    q = np.int64(f.head[cell])
+                    while q >= 0:
+                        c = block[q, CLUSTER]
+                        # of all blocks that are listed, each pair once
+                        if c != own and (q > b if still else f.group[c, LISTED_IN] != batch):
+                            checked += 1
+                            look(f, b, q, t, still, x, dx, reach)
+                        q = np.int64(block[q, NEXT])
         f.count[LISTED] += 1
-        for code in range(3**d):
-            cell, rest, steps, stride = np.int64(0), np.int64(f.block[b, CELL]), code, np.int64(1)
-            for m in range(d):
-                k = d - 1 - m
-                n = f.cells[k]
-                at = rest % n
-                rest //= n
-                step = steps % 3 - 1
-                steps //= 3
-                at += step
-                if f.period[k] > 0.0:
-                    if (n == 1 and step != 0) or (n == 2 and step < 0):
-                        cell = -1
-                        break
-                    at = at + n if at < 0 else at - n if at >= n else at
-                elif at < 0 or at >= n:
-                    cell = -1
-                    break
-                cell += at * stride
-                stride *= n
-            if cell < 0:
-                continue
-            q = np.int64(f.head[cell])
-            while q >= 0:
-                c = f.block[q, CLUSTER]
-                if batch < 0:  # all blocks are listed: each pair once
-                    skip = q <= b
-                else:
-                    skip = f.group[c, LISTED_IN] == batch
-                if c != own and not skip:
-                    look(f, b, q, t, x, dx, reach)
-                q = np.int64(f.block[q, NEXT])
+        f.count[CHECKED] += checked
 
     @piece
     def fold(f, t):
         """Bring all blocks to a time, so that clusters have no displacement."""
-        for b in range(f.place.shape[0]):
+        place, body, bound = f.place, f.body, f.bound
+        for b in range(place.shape[0]):
             for k in range(d):
-                f.place[b, k] = centre(f, b, k, t)
-        for c in range(f.body.shape[0]):
-            if f.body[c, 2 * d + MASS] > 0.0:
+                place[b, k] = centre(f, b, k, t)
+        for c in range(body.shape[0]):
+            if body[c, 2 * d + MASS] > 0.0:
                 bring(f, c, t)
                 for k in range(d):
-                    f.bound[c, k] += f.body[c, k]
-                    f.bound[c, d + k] += f.body[c, k]
-                    f.body[c, k] = 0.0
+                    bound[c, k] += body[c, k]
+                    bound[c, d + k] += body[c, k]
+                    body[c, k] = 0.0
 
     @cold_piece
-    def list_blocks(f, b, stop, t, batch, work):
-        """List blocks, which are in their cells: a chain from `b` up to, not with, `stop`.
+    def list_blocks(f, groups, b, stop, t, batch, work, near):
+        """List blocks, which are in their cells, of the clusters up to a number.
 
-        With a negative `batch` all of them, one after the other.
+        Of cluster `b` if that is none: the chain from block `b` up to, not with, `stop`. With
+        `batch` zero all blocks, one after the other, else those of clusters to be listed in it.
         """
-        while b != stop:
-            search(f, b, t, batch, work)
-            b = b + 1 if batch < 0 else np.int64(f.block[b, CHAIN])
+        group = f.group
+        for c in range(larger(groups, 1)):
+            if groups > 0:
+                if batch > 0 and group[c, LISTED_IN] != batch - 1:
+                    continue
+                b = np.int64(group[c, START])
+            while b != stop:
+                search(f, b, t, batch, work, near)
+                b = b + 1 if batch == 0 else np.int64(f.block[b, CHAIN])
+            if groups > 0:
+                group[c, LISTED_IN] = batch
 
     @cold_piece
     def empty(f, t):
         """Bring all to a time, strike all pairs off and put all blocks into their cells."""
+        group, body, count = f.group, f.body, f.count
         fold(f, t)
-        f.count[FREE], f.count[USED], f.count[PAIRS], f.count[HEAP] = -1, 0, 0, 0
-        for c in range(f.body.shape[0]):
-            f.group[c, EDGE] = f.group[c, LAST_EDGE] = -1
-            f.body[c, 2 * d + WAY] = 0.0
+        count[FREE], count[USED], count[PAIRS], count[HEAP] = -1, 0, 0, 0
+        for c in range(body.shape[0]):
+            group[c, EDGE] = group[c, LAST_EDGE] = -1
+            body[c, 2 * d + WAY] = 0.0
         f.head[:] = -1
         for b in range(f.place.shape[0] - 1, -1, -1):
-            insert(f, b, cell_at(f, b, t))
+            insert(f, np.int64(b), cell_at(f, b, t))
 
-    @cold_piece
+    @piece
     def rebin_chain(f, b, stop, t):
         """Put the blocks of a chain from `b` up to, not with, `stop` into their cells of now."""
         while b != stop:

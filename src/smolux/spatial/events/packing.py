@@ -36,13 +36,14 @@ def cell_of_disc(x, i, length, period, cells):
 @entry
 def positions(f, t, x):
     """Write where the discs are at a time, in the order of the flight."""
+    body = f.body
     d = x.shape[1]
     for i in range(x.shape[0]):
         b = f.disc[i, BLOCK]
         c = f.block[b, CLUSTER]
-        dt = t - f.body[c, 2 * d + SINCE]
+        dt = t - body[c, 2 * d + SINCE]
         for k in range(d):
-            x[i, k] = f.rel[i, k] + f.place[b, k] + (f.body[c, k] + f.body[c, d + k] * dt)
+            x[i, k] = f.rel[i, k] + f.place[b, k] + (body[c, k] + body[c, d + k] * dt)
 
 
 @piece
@@ -100,14 +101,15 @@ def order(x, label, length, period, cells, span, counts, perm, opens):
 @piece
 def close(f, b, x, perm):
     """Put the place of a block into the middle of its discs."""
+    block = f.block
     for k in range(x.shape[1]):
         low, high = math.inf, -math.inf
-        for m in range(f.block[b, FIRST], f.block[b + 1, FIRST]):
+        for m in range(block[b, FIRST], block[b + 1, FIRST]):
             low, high = min(low, x[perm[m], k]), max(high, x[perm[m], k])
         middle = 0.5 * (low + high)
         f.place[b, k] = middle
         f.half[b, k] = 0.5 * (high - low) * (1.0 + 1e-6) if high > low else 0.0
-        for m in range(f.block[b, FIRST], f.block[b + 1, FIRST]):
+        for m in range(block[b, FIRST], block[b + 1, FIRST]):
             f.rel[m, k] = x[perm[m], k] - middle
 
 
@@ -117,30 +119,31 @@ def pack(f, x, label, names, perm, opens, new_label):
 
     `new_label` is -1 and becomes the new number of each cluster. Returns the number of clusters.
     """
+    block, disc, group = f.block, f.disc, f.group
     blocks, clusters = 0, 0
     for m in range(perm.shape[0]):
         i = perm[m]
-        f.disc[m, NAME] = names[i]
+        disc[m, NAME] = names[i]
         if opens[m]:
-            f.block[blocks, FIRST] = m
+            block[blocks, FIRST] = m
             c = new_label[label[i]]
             if c < 0:
                 c = clusters
                 new_label[label[i]] = c
                 clusters += 1
-                f.group[c, START] = blocks
-                f.group[c, BLOCKS] = 0
-                f.group[c, DISCS] = 0
+                group[c, START] = blocks
+                group[c, BLOCKS] = 0
+                group[c, DISCS] = 0
             else:
-                f.block[f.group[c, END], CHAIN] = blocks
-            f.group[c, END] = blocks
-            f.block[blocks, CHAIN] = -1
-            f.block[blocks, CLUSTER] = c
-            f.group[c, BLOCKS] += 1
+                block[group[c, END], CHAIN] = blocks
+            group[c, END] = blocks
+            block[blocks, CHAIN] = -1
+            block[blocks, CLUSTER] = c
+            group[c, BLOCKS] += 1
             blocks += 1
-        f.disc[m, BLOCK] = blocks - 1
-        f.group[f.block[blocks - 1, CLUSTER], DISCS] += 1
-    f.block[blocks, FIRST] = perm.shape[0]
+        disc[m, BLOCK] = blocks - 1
+        group[block[blocks - 1, CLUSTER], DISCS] += 1
+    block[blocks, FIRST] = perm.shape[0]
     for b in range(blocks):
         close(f, b, x, perm)
     return clusters

@@ -22,89 +22,96 @@ from .flight import (
 
 
 @piece
+def cluster_of(f, i):
+    """Cluster of a disc."""
+    return f.block[f.disc[i, BLOCK], CLUSTER]
+
+
+@piece
 def link(f, h, c):
     """Put a half-edge into the list of a cluster."""
-    top = f.group[c, EDGE]
-    f.link[h, BEFORE] = -1
-    f.link[h, AFTER] = top
+    group, link = f.group, f.link
+    top = group[c, EDGE]
+    link[h, BEFORE] = -1
+    link[h, AFTER] = top
     if top >= 0:
-        f.link[top, BEFORE] = h
+        link[top, BEFORE] = h
     else:
-        f.group[c, LAST_EDGE] = h
-    f.group[c, EDGE] = h
+        group[c, LAST_EDGE] = h
+    group[c, EDGE] = h
 
 
 @piece
 def unlink(f, h, c):
     """Take a half-edge out of the list of a cluster."""
-    before, after = f.link[h, BEFORE], f.link[h, AFTER]
+    link, group = f.link, f.group
+    before, after = link[h, BEFORE], link[h, AFTER]
     if before >= 0:
-        f.link[before, AFTER] = after
+        link[before, AFTER] = after
     else:
-        f.group[c, EDGE] = after
+        group[c, EDGE] = after
     if after >= 0:
-        f.link[after, BEFORE] = before
+        link[after, BEFORE] = before
     else:
-        f.group[c, LAST_EDGE] = before
+        group[c, LAST_EDGE] = before
 
 
 @piece
 def add(f, i, j, a, b):
     """List a pair of discs of two clusters."""
-    p = f.count[FREE]
+    pair, count = f.pair, f.count
+    p = count[FREE]
     if p >= 0:
-        f.count[FREE] = f.link[2 * p, AFTER]
-    elif f.count[USED] < f.pair.shape[0]:
-        p = f.count[USED]
-        f.count[USED] = p + 1
+        count[FREE] = f.link[2 * p, AFTER]
+    elif count[USED] < pair.shape[0]:
+        p = count[USED]
+        count[USED] = p + 1
     else:
-        f.count[FULL] = PAIR
+        count[FULL] = PAIR
         return
-    f.pair[p, ONE], f.pair[p, TWO] = i, j
+    pair[p, ONE], pair[p, TWO] = i, j
     link(f, 2 * p, a)
     link(f, 2 * p + 1, b)
-    f.count[PAIRS] += 1
+    count[PAIRS] += 1
 
 
 @piece
 def remove(f, p, a, b):
     """Strike a pair off; what was predicted for it is out of date."""
+    count = f.count
     unlink(f, 2 * p, a)
     unlink(f, 2 * p + 1, b)
     f.pair[p, VERSION] += 1
-    f.link[2 * p, AFTER] = f.count[FREE]
-    f.count[FREE] = p
-    f.count[PAIRS] -= 1
+    f.link[2 * p, AFTER] = count[FREE]
+    count[FREE] = p
+    count[PAIRS] -= 1
 
 
 @piece
 def remove_all(f, c):
     """Strike all pairs of a cluster off."""
+    link, pair = f.link, f.pair
     h = f.group[c, EDGE]
     while h >= 0:
         p = h >> 1
-        after = f.link[h, AFTER]
+        after = link[h, AFTER]
         if after == h ^ 1:  # a pair inside the cluster
-            after = f.link[after, AFTER]
-        remove(
-            f,
-            p,
-            f.block[f.disc[f.pair[p, ONE], BLOCK], CLUSTER],
-            f.block[f.disc[f.pair[p, TWO], BLOCK], CLUSTER],
-        )
+            after = link[after, AFTER]
+        remove(f, p, cluster_of(f, pair[p, ONE]), cluster_of(f, pair[p, TWO]))
         h = after
 
 
 @piece
 def splice(f, a, b):
     """Give all pairs of cluster `b` to cluster `a`."""
-    if f.group[b, EDGE] < 0:
+    group, link = f.group, f.link
+    if group[b, EDGE] < 0:
         return
-    if f.group[a, EDGE] < 0:
-        f.group[a, EDGE], f.group[a, LAST_EDGE] = f.group[b, EDGE], f.group[b, LAST_EDGE]
+    if group[a, EDGE] < 0:
+        group[a, EDGE], group[a, LAST_EDGE] = group[b, EDGE], group[b, LAST_EDGE]
     else:
-        top = f.group[a, EDGE]
-        f.link[f.group[b, LAST_EDGE], AFTER] = top
-        f.link[top, BEFORE] = f.group[b, LAST_EDGE]
-        f.group[a, EDGE] = f.group[b, EDGE]
-    f.group[b, EDGE] = f.group[b, LAST_EDGE] = -1
+        top = group[a, EDGE]
+        link[group[b, LAST_EDGE], AFTER] = top
+        link[top, BEFORE] = group[b, LAST_EDGE]
+        group[a, EDGE] = group[b, EDGE]
+    group[b, EDGE] = group[b, LAST_EDGE] = -1

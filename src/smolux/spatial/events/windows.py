@@ -60,7 +60,6 @@ from .flight import (
     THICKEST,
     TIME,
     TWO,
-    USED,
     VERSION,
     WAY,
     WHAT,
@@ -68,14 +67,16 @@ from .flight import (
     WINDOW,
     WINDOWS,
 )
-from .geometry import FILLED, contact_time, shift, wall_time
+from .geometry import FILLED, contact_time, larger, shift, smaller, wall_time
 from .heap import is_current, pop, push
-from .pairs import remove, remove_all, splice
+from .pairs import cluster_of, remove, remove_all, splice
 
 #: differences of velocity below this share of the largest speed come from rounding
 REST = 1e-13
 #: blocks that are listed between two returns
 SLICE = 500_000
+#: all blocks are listed, which is cheaper for each, if more than this share is due
+MOST = 0.5
 #: a step of the skin, and how far its costs may be from balance
 STEP, TOO_SMALL, TOO_LARGE = 1.5, 2.0, 0.3
 #: costs of a listing, of a look at a pair and of a prediction, in arbitrary units
@@ -91,84 +92,109 @@ def bind(d):
     def speed(f, c):
         square = 0.0
         for k in range(d):
-            square += f.body[c, d + k] ** 2
+            square += f.body[c, d + k] * f.body[c, d + k]
         return math.sqrt(square)
 
     @piece
     def predict(f, p, t):
         """Predict the contact of a pair, and remember it if nothing is known to come before."""
-        i, j = f.pair[p, ONE], f.pair[p, TWO]
-        g, h = f.disc[i, BLOCK], f.disc[j, BLOCK]
-        m, n = f.block[g, CLUSTER], f.block[h, CLUSTER]
+        pair, disc, block, radius, body, rel, place = (
+            f.pair,
+            f.disc,
+            f.block,
+            f.radius,
+            f.body,
+            f.rel,
+            f.place,
+        )
+        i, j = pair[p, ONE], pair[p, TWO]
+        g, h = disc[i, BLOCK], disc[j, BLOCK]
+        m, n = block[g, CLUSTER], block[h, CLUSTER]
         spread = f.count[SPREAD]
-        s = f.radius[i * spread] + f.radius[j * spread]
-        dm, dn = t - f.body[m, since], t - f.body[n, since]
+        s = radius[i * spread] + radius[j * spread]
+        dm, dn = t - body[m, since], t - body[n, since]
         a, b, c = 0.0, 0.0, -s * s
         for k in range(d):
-            vm, vn = f.body[m, d + k], f.body[n, d + k]
-            x = f.rel[j, k] + f.place[h, k] + f.body[n, k] + vn * dn
-            x -= f.rel[i, k] + f.place[g, k] + f.body[m, k] + vm * dm
+            vm, vn = body[m, d + k], body[n, d + k]
+            x = rel[j, k] + place[h, k] + body[n, k] + vn * dn
+            x -= rel[i, k] + place[g, k] + body[m, k] + vm * dm
             x += shift(x, f.period[k])
             w = vn - vm
             a += w * w
             b += x * w
             c += x * x
         f.count[PREDICTED] += 1
+        pair[p, VERSION] += 1
         touch = t + contact_time(a, b, c)
-        if touch <= min(f.body[m, horizon], f.body[n, horizon]):
-            push(f, touch, p, f.pair[p, VERSION])
+        if touch <= smaller(body[m, horizon], body[n, horizon]):
+            push(f, touch, p, pair[p, VERSION])
 
     @piece
     def next_wall(f, c):
         """Time at which a cluster touches a wall, and the axis; without a later change."""
+        body, bound = f.body, f.bound
         best, axis = math.inf, 0
         for k in range(d):
             if f.period[k] == 0.0:
-                x = f.body[c, k]
-                t = wall_time(
-                    f.bound[c, k] + x, f.bound[c, d + k] + x, f.body[c, d + k], f.length[k]
-                )
+                x = body[c, k]
+                t = wall_time(bound[c, k] + x, bound[c, d + k] + x, body[c, d + k], f.length[k])
                 if t < best:
                     best, axis = t, k
-        return f.body[c, since] + best, axis
+        return body[c, since] + best, axis
 
     @cold_piece
-    def look_ahead(f, c):
-        """Set until when a cluster flies freely: up to a wall, or to the end of its way."""
-        left = f.clock[BUDGET_OF_WAY] - f.body[c, way]
-        v = speed(f, c)
-        end = f.body[c, since] + left / v if v > 0.0 else math.inf
-        f.group[c, STAMP] += 1
-        wall, _ = next_wall(f, c)
-        if wall <= end:
-            push(f, wall, -1 - c, f.group[c, STAMP])
-            end = wall
-        f.body[c, horizon] = end
+    def look_ahead(f, c, stop, batch):
+        """Set until when clusters fly freely: up to a wall, or to the end of their way.
+
+        Of all clusters ``c .. stop - 1`` that are there and, if `batch` is not zero, were listed in
+        it.
+        """
+        group, body = f.group, f.body
+        while c < stop:
+            if body[c, mass] > 0.0 and (batch == 0 or group[c, LISTED_IN] == batch):
+                left = f.clock[BUDGET_OF_WAY] - body[c, way]
+                v = speed(f, c)
+                end = body[c, since] + left / v if v > 0.0 else math.inf
+                group[c, STAMP] += 1
+                wall, _ = next_wall(f, c)
+                if wall <= end:
+                    push(f, wall, -1 - c, group[c, STAMP])
+                    end = wall
+                body[c, horizon] = end
+            c += 1
 
     @cold_piece
-    def predict_all(f, c, t):
-        """Predict all contacts of a cluster; pairs inside it are struck off. Of all, if c < 0."""
-        h = np.int64(0)
-        if c >= 0:
-            h = np.int64(f.group[c, EDGE])
-        elif f.count[USED] == 0:
+    def predict_all(f, c, stop, batch, every, t):
+        """Predict all contacts of clusters; pairs inside them are struck off.
+
+        Of clusters as in `look_ahead`. If these are `every` cluster, each pair is met twice, and
+        predicted once.
+        """
+        group, link, pair = f.group, f.link, f.pair
+        while c < stop:
             h = np.int64(-1)
-        while h >= 0:
-            p, after = h >> 1, np.int64(f.link[h, AFTER])
-            if c < 0:
-                after = h + 2 if h + 2 < 2 * f.count[USED] else np.int64(-1)
-            elif (
-                f.block[f.disc[f.pair[p, ONE], BLOCK], CLUSTER]
-                == f.block[f.disc[f.pair[p, TWO], BLOCK], CLUSTER]
-            ):
-                if after == h ^ 1:
-                    after = np.int64(f.link[after, AFTER])
-                remove(f, p, c, c)
+            if batch == 0 or group[c, LISTED_IN] == batch:
+                h = np.int64(group[c, EDGE])
+            while h >= 0:
+                p, after = h >> 1, np.int64(link[h, AFTER])
+                if every > 0:
+                    if h & 1 == 0:
+                        predict(f, p, t)
+                elif cluster_of(f, pair[p, ONE]) == cluster_of(f, pair[p, TWO]):
+                    if after == h ^ 1:
+                        after = np.int64(link[after, AFTER])
+                    remove(f, p, np.int32(c), np.int32(c))
+                else:
+                    predict(f, p, t)
                 h = after
-                continue
-            f.pair[p, VERSION] += 1
-            predict(f, p, t)
-            h = after
+            c += 1
+
+    @piece
+    def foresee(f, c, t):
+        """Predict all that concerns a cluster."""
+        none = np.int64(0)
+        look_ahead(f, c, c + 1, none)
+        predict_all(f, c, c + 1, none, none, t)
 
     @cold_piece
     def strike(f, c):
@@ -176,100 +202,97 @@ def bind(d):
         remove_all(f, c)
 
     @piece
-    def relist_all(f, work):
+    def relist_all(f, work, near):
         """List everything, and predict."""
-        t = f.clock[TIME]
+        t, none, all_ = f.clock[TIME], np.int64(0), np.int64(f.body.shape[0])
         empty(f, t)
         f.count[REBUILT] += 1
-        list_blocks(f, np.int64(0), np.int64(f.place.shape[0]), t, np.int64(-1), work)
-        for c in range(f.body.shape[0]):
-            if f.body[c, mass] > 0.0:
-                look_ahead(f, c)
-        if f.count[FULL] == 0:
-            predict_all(f, np.int64(-1), t)
+        list_blocks(f, none, none, np.int64(f.place.shape[0]), t, none, work, near)
+        look_ahead(f, none, all_, none)
+        predict_all(f, none, all_, none, np.int64(1), t)
 
     @piece
-    def relist_due(f, work):
+    def relist_due(f, work, near):
         """List the clusters that were marked for it, and predict."""
-        t, number, none = f.clock[TIME], 2 * f.count[BATCH], np.int64(-1)
-        for c in range(f.body.shape[0]):
-            if f.group[c, LISTED_IN] == number:
-                strike(f, c)
+        body, group = f.body, f.group
+        t, batch, none = f.clock[TIME], 2 * f.count[BATCH], np.int64(-1)
+        all_ = np.int64(body.shape[0])
+        for c in range(all_):
+            if group[c, LISTED_IN] == batch:
+                remove_all(f, c)
                 bring(f, c, t)
-                f.body[c, way] = 0.0
-                rebin_chain(f, np.int64(f.group[c, START]), none, t)
-        for c in range(f.body.shape[0]):
-            if f.group[c, LISTED_IN] == number:
-                list_blocks(f, np.int64(f.group[c, START]), none, t, number + 1, work)
-                f.group[c, LISTED_IN] = number + 1
-                look_ahead(f, c)
-        for c in range(f.body.shape[0]):
-            if f.group[c, LISTED_IN] == number + 1:
-                predict_all(f, np.int64(c), t)
+                body[c, way] = 0.0
+                rebin_chain(f, np.int64(group[c, START]), none, t)
+        list_blocks(f, all_, none, none, t, batch + 1, work, near)
+        look_ahead(f, np.int64(0), all_, batch + 1)
+        predict_all(f, np.int64(0), all_, batch + 1, np.int64(0), t)
 
     @piece
     def fastest(f):
         """Largest speed, and whether nothing moves relative to anything else."""
-        square, still = 0.0, True
-        for c in range(f.body.shape[0]):
-            if f.body[c, mass] > 0.0:
-                square = max(square, speed(f, c) ** 2)
+        body = f.body
+        top, still = 0.0, True
+        for c in range(body.shape[0]):
+            if body[c, mass] > 0.0:
+                top = larger(top, speed(f, c))
         for k in range(d):
             low, high = math.inf, -math.inf
-            for c in range(f.body.shape[0]):
-                if f.body[c, mass] > 0.0:
-                    low, high = min(low, f.body[c, d + k]), max(high, f.body[c, d + k])
-            spread = high - low if f.period[k] > 0.0 else max(high, -low)
+            for c in range(body.shape[0]):
+                if body[c, mass] > 0.0:
+                    low, high = smaller(low, body[c, d + k]), larger(high, body[c, d + k])
+            spread = high - low if f.period[k] > 0.0 else larger(high, -low)
             still = still and spread <= REST * f.clock[SCALE]
-        return math.sqrt(square), still
+        return top, still
 
     @piece
     def judge_skin(f):
         """Whether another skin would cost less; write it, and begin to count anew."""
-        listed = f.count[LISTED] - f.count[MARK_LISTED]
-        if listed < max(2 * f.place.shape[0], 1000):
+        count, clock = f.count, f.clock
+        listed = count[LISTED] - count[MARK_LISTED]
+        if listed < larger(2 * f.place.shape[0], 1000):
             return False
         often = LIST_COST * listed
-        wide = CHECK_COST * (f.count[CHECKED] - f.count[MARK_CHECKED])
-        wide += PREDICT_COST * (f.count[PREDICTED] - f.count[MARK_PREDICTED])
-        f.count[MARK_LISTED] = f.count[LISTED]
-        f.count[MARK_CHECKED] = f.count[CHECKED]
-        f.count[MARK_PREDICTED] = f.count[PREDICTED]
-        skin = f.clock[SKIN]
+        wide = CHECK_COST * (count[CHECKED] - count[MARK_CHECKED])
+        wide += PREDICT_COST * (count[PREDICTED] - count[MARK_PREDICTED])
+        count[MARK_LISTED] = count[LISTED]
+        count[MARK_CHECKED] = count[CHECKED]
+        count[MARK_PREDICTED] = count[PREDICTED]
+        skin = clock[SKIN]
         if often > TOO_SMALL * wide:
-            f.clock[SKIN] = min(skin * STEP, f.clock[THICKEST])
+            clock[SKIN] = smaller(skin * STEP, clock[THICKEST])
         elif often < TOO_LARGE * wide:
-            f.clock[SKIN] = skin / STEP
-        return f.clock[SKIN] != skin
+            clock[SKIN] = skin / STEP
+        return clock[SKIN] != skin
 
     @cold_piece
-    def open_window(f, patience, work):
+    def open_window(f, patience, work, near):
         """Choose the end of a window and list what needs it; return a code."""
-        t = f.clock[TIME]
+        body, group, count, clock = f.body, f.group, f.count, f.clock
+        t = clock[TIME]
         v, still = fastest(f)
         if still:
             return AT_REST
-        if (t - f.clock[LATEST]) * v > patience * f.clock[LONGEST]:
+        if (t - clock[LATEST]) * v > patience * clock[LONGEST]:
             return LONELY
         if judge_skin(f):
             return RESKIN
-        f.count[WINDOWS] += 1
-        f.count[BATCH] += 1
-        limit = f.clock[BUDGET_OF_WAY]
+        count[WINDOWS] += 1
+        count[BATCH] += 1
+        limit = clock[BUDGET_OF_WAY]
         length = limit / v
         due = 0
-        for c in range(f.body.shape[0]):
-            if f.body[c, mass] > 0.0:
+        for c in range(body.shape[0]):
+            if body[c, mass] > 0.0:
                 u = speed(f, c)
-                moved = f.body[c, way] + u * (t - f.body[c, since])
+                moved = body[c, way] + u * (t - body[c, since])
                 if moved + u * length > limit:
-                    f.group[c, LISTED_IN] = 2 * f.count[BATCH]
-                    due += f.group[c, BLOCKS]
-        f.clock[WINDOW] = t + length
-        if 2 * due > f.place.shape[0]:
-            relist_all(f, work)
+                    group[c, LISTED_IN] = 2 * count[BATCH]
+                    due += group[c, BLOCKS]
+        clock[WINDOW] = t + length
+        if due > MOST * f.place.shape[0]:
+            relist_all(f, work, near)
         elif due > 0:
-            relist_due(f, work)
+            relist_due(f, work, near)
         return room(f)
 
     @piece
@@ -282,63 +305,67 @@ def bind(d):
     @piece
     def absorb(f, a, b, image):
         """Make cluster `b`, at the same time, part of cluster `a`; pairs are left alone."""
-        ma, mb = f.body[a, mass], f.body[b, mass]
+        block, group, body, bound = f.block, f.group, f.body, f.bound
+        ma, mb = body[a, mass], body[b, mass]
         for k in range(d):
-            move = f.body[b, k] - f.body[a, k] + image[k]
-            q = np.int64(f.group[b, START])
+            move = body[b, k] - body[a, k] + image[k]
+            q = np.int64(group[b, START])
             while q >= 0:
                 f.place[q, k] += move
-                q = np.int64(f.block[q, CHAIN])
-            f.bound[a, k] = min(f.bound[a, k], f.bound[b, k] + move)
-            f.bound[a, d + k] = max(f.bound[a, d + k], f.bound[b, d + k] + move)
-            mean = (ma * f.body[a, d + k] + mb * f.body[b, d + k]) / (ma + mb)
-            f.body[a, d + k] = mean
-        q = np.int64(f.group[b, START])
+                q = np.int64(block[q, CHAIN])
+            bound[a, k] = smaller(bound[a, k], bound[b, k] + move)
+            bound[a, d + k] = larger(bound[a, d + k], bound[b, d + k] + move)
+            mean = (ma * body[a, d + k] + mb * body[b, d + k]) / (ma + mb)
+            body[a, d + k] = mean
+        q = np.int64(group[b, START])
         while q >= 0:
-            f.block[q, CLUSTER] = a
-            q = np.int64(f.block[q, CHAIN])
-        f.block[f.group[a, END], CHAIN] = f.group[b, START]
-        f.group[a, END] = f.group[b, END]
-        f.count[RELABELLED] += f.group[b, BLOCKS]
-        f.group[a, BLOCKS] += f.group[b, BLOCKS]
-        f.group[a, DISCS] += f.group[b, DISCS]
-        f.body[a, mass] = ma + mb
-        f.body[b, mass] = 0.0
-        f.group[b, STAMP] += 1
+            block[q, CLUSTER] = a
+            q = np.int64(block[q, CHAIN])
+        block[group[a, END], CHAIN] = group[b, START]
+        group[a, END] = group[b, END]
+        f.count[RELABELLED] += group[b, BLOCKS]
+        group[a, BLOCKS] += group[b, BLOCKS]
+        group[a, DISCS] += group[b, DISCS]
+        body[a, mass] = ma + mb
+        body[b, mass] = 0.0
+        group[b, STAMP] += 1
 
     @piece
     def image_of(f, i, j, t, image):
         """Write what brings disc `j` to its image nearest to disc `i`."""
-        g, h = f.disc[i, BLOCK], f.disc[j, BLOCK]
-        m, n = f.block[g, CLUSTER], f.block[h, CLUSTER]
+        disc, block, body, rel, place = f.disc, f.block, f.body, f.rel, f.place
+        g, h = disc[i, BLOCK], disc[j, BLOCK]
+        m, n = block[g, CLUSTER], block[h, CLUSTER]
         for k in range(d):
-            x = f.rel[j, k] + f.place[h, k] + f.body[n, k]
-            x -= f.rel[i, k] + f.place[g, k] + f.body[m, k]
+            x = rel[j, k] + place[h, k] + body[n, k]
+            x -= rel[i, k] + place[g, k] + body[m, k]
             image[k] = shift(x, f.period[k])
 
     @piece
-    def merge(f, p, t, work):
+    def merge(f, p, t, work, near):
         """Make one cluster of two; return their discs in contact."""
-        i, j = np.int64(f.pair[p, ONE]), np.int64(f.pair[p, TWO])
-        if f.disc[j, NAME] < f.disc[i, NAME]:
+        body, disc, group, pair, block = f.body, f.disc, f.group, f.pair, f.block
+        i, j = np.int64(pair[p, ONE]), np.int64(pair[p, TWO])
+        if disc[j, NAME] < disc[i, NAME]:
             i, j = j, i
-        first, second = f.disc[i, NAME], f.disc[j, NAME]
+        first, second = disc[i, NAME], disc[j, NAME]
         a, b = (
-            np.int64(f.block[f.disc[i, BLOCK], CLUSTER]),
-            np.int64(f.block[f.disc[j, BLOCK], CLUSTER]),
+            np.int64(block[disc[i, BLOCK], CLUSTER]),
+            np.int64(block[disc[j, BLOCK], CLUSTER]),
         )
-        if f.group[b, DISCS] > f.group[a, DISCS]:
+        if group[b, DISCS] > group[a, DISCS]:
             a, b, i, j = b, a, j, i
         bring(f, a, t)
         bring(f, b, t)
         image_of(f, i, j, t, work[0])
-        small = np.int64(f.group[b, START])
+        small = np.int64(group[b, START])
         limit = f.clock[BUDGET_OF_WAY]
-        mine, other = f.body[a, way], f.body[b, way]
-        ma, mb = f.body[a, mass], f.body[b, mass]
+        mine, other = body[a, way], body[b, way]
+        ma, mb = body[a, mass], body[b, mass]
         square = 0.0
         for k in range(d):
-            square += ((ma * f.body[a, d + k] + mb * f.body[b, d + k]) / (ma + mb)) ** 2
+            mean = (ma * body[a, d + k] + mb * body[b, d + k]) / (ma + mb)
+            square += mean * mean
         ahead = math.sqrt(square) * (f.clock[WINDOW] - t)
         # a cluster has moved as far as its part that has moved most since it was listed
         keep_small, keep_large = other + ahead <= limit, mine + ahead <= limit
@@ -348,60 +375,60 @@ def bind(d):
             strike(f, a)
         absorb(f, a, b, work[0])
         splice(f, a, b)
-        f.body[a, way] = max(mine if keep_large else 0.0, other if keep_small else 0.0)
+        body[a, way] = larger(mine if keep_large else 0.0, other if keep_small else 0.0)
         if not (keep_small and keep_large):
             f.count[BATCH] += 1
-            begin = small if keep_large else np.int64(f.group[a, START])
+            begin = small if keep_large else np.int64(group[a, START])
             stop = small if keep_small else np.int64(-1)
             rebin_chain(f, begin, stop, t)
-            list_blocks(f, begin, stop, t, 2 * f.count[BATCH] + 1, work)
-        look_ahead(f, a)
-        predict_all(f, a, t)
+            list_blocks(f, np.int64(0), begin, stop, t, 2 * f.count[BATCH] + 1, work, near)
+        foresee(f, a, t)
         return first, second
 
     @piece
     def reflect(f, c, t):
         """Turn a cluster back at a wall; return one of its discs, and the axis as it is logged."""
+        body, bound = f.body, f.bound
         _, axis = next_wall(f, c)
         bring(f, c, t)
-        fills = f.bound[c, d + axis] - f.bound[c, axis] >= f.length[axis] * (1.0 - FILLED)
-        f.body[c, d + axis] = 0.0 if fills else -f.body[c, d + axis]
-        look_ahead(f, c)
-        predict_all(f, c, t)
+        fills = bound[c, d + axis] - bound[c, axis] >= f.length[axis] * (1.0 - FILLED)
+        body[c, d + axis] = 0.0 if fills else -body[c, d + axis]
+        foresee(f, c, t)
         return f.disc[f.block[f.group[c, START], FIRST], NAME], np.int32(
             -1 - axis - (d if fills else 0)
         )
 
-    def fly(f, log, until, target, patience, budget, work):
-        done, listed = 0, f.count[LISTED]
-        while f.count[CLUSTERS] > target and f.clock[TIME] < until:
-            if f.clock[TIME] >= f.clock[WINDOW]:
-                if f.count[LISTED] - listed > SLICE:
+    def fly(f, log, until, target, patience, budget, work, near):
+        when, event, count, clock = f.when, f.event, f.count, f.clock
+        done, listed = 0, count[LISTED]
+        while count[CLUSTERS] > target and clock[TIME] < until:
+            if clock[TIME] >= clock[WINDOW]:
+                if count[LISTED] - listed > SLICE:
                     return BUDGET, done
-                code = open_window(f, patience, work)
+                code = open_window(f, patience, work, near)
                 if code != DONE:
                     return code, done
-            end = min(f.clock[WINDOW], until)
-            while f.count[HEAP] > 0 and f.when[0] <= end:
+            end = smaller(clock[WINDOW], until)
+            while count[HEAP] > 0 and when[0] <= end:
                 if done == budget or done == log.time.shape[0]:
                     return BUDGET, done
-                t, what, which = f.when[0], np.int64(f.event[0, WHAT]), f.event[0, WHICH]
+                t, what, which = when[0], np.int64(event[0, WHAT]), event[0, WHICH]
                 pop(f)
                 if not is_current(f, what, which):
                     continue
-                f.clock[TIME] = t
+                clock[TIME] = t
                 if what >= 0:
-                    first, second = merge(f, what, t, work)
-                    f.count[CLUSTERS] -= 1
-                    f.clock[LATEST] = t
+                    first, second = merge(f, what, t, work, near)
+                    count[CLUSTERS] -= 1
+                    clock[LATEST] = t
                 else:
                     first, second = reflect(f, -1 - what, t)
                 log.time[done], log.first[done], log.second[done] = t, first, second
                 done += 1
                 code = room(f)
-                if code != DONE or f.count[CLUSTERS] <= target:
+                if code != DONE or count[CLUSTERS] <= target:
                     return code, done
-            f.clock[TIME] = end
+            clock[TIME] = end
         return DONE, done
 
     return entry(fly)
