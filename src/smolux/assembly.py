@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from .core.compile import digest, piece, user_piece
-from .core.loop import make_loop
+from .core.loop import make_loop, tally_one
 from .core.state import Windows
+from .core.weights import make_outcome, make_rate, make_tally, make_weight
 from .errors import InputError
 from .methods.base import Method, Rates
 from .model import Model
@@ -40,17 +41,17 @@ def _outcomes(functions: Sequence[Callable[..., Any]]) -> Any:
     if len(functions) == 1:
 
         @piece
-        def last(r, i, j, sizes, counts):
-            return first(i, j, sizes, counts)
+        def last(r, i, j, s, p, q):
+            return first(i, j, s.sizes, s.counts), 3
 
         return last
     others = _outcomes(functions[1:])
 
     @piece
-    def outcome(r, i, j, sizes, counts):
+    def outcome(r, i, j, s, p, q):
         if r == 0:
-            return first(i, j, sizes, counts)
-        return others(r - 1, i, j, sizes, counts)
+            return first(i, j, s.sizes, s.counts), 3
+        return others(r - 1, i, j, s, p, q)
 
     return outcome
 
@@ -82,28 +83,37 @@ _loops: dict[tuple[Any, ...], Any] = {}
 def loop_for(model: Model, method: Method, weighting: Weighting) -> Any:
     """Return the compiled loop, the same object for the same physics and method.
 
-    The settings of a method are data of its work arrays; those of a weighting are compiled in.
+    The settings of a method are data of its work arrays, those of a weighting parameters.
     """
-    rate = model.kernel.rate
+    rate, own = model.kernel.rate, len(model.kernel.parameters)
     outcomes = [type(process).outcome for process in model.processes]
     factors = [process.factor.rate for process in model.processes]
-    key = (type(method), weighting, *map(digest, (rate, *outcomes, *factors)))
+    weighted = [f for f in (weighting.weight, weighting.factor) if f is not None]
+    key = (type(method), own, len(weighted), *map(digest, (rate, *outcomes, *factors, *weighted)))
     if key not in _loops:
-        simulated = weighting.compiled(_as_float(rate))
-        _loops[key] = make_loop(method.bind(simulated), _outcomes(outcomes), _factors(factors))
+        simulated, outcome, tally = _as_float(rate), _outcomes(outcomes), tally_one
+        if weighting.weight is not None:
+            weight = make_weight(weighting.weight, own)
+            simulated = make_rate(simulated, weighting.weight, weighting.factor, own)
+            outcome, tally = make_outcome(outcome, weight), make_tally(weight)
+        pieces = method.bind(simulated, tally)
+        _loops[key] = make_loop(pieces, outcome, _factors(factors), weighting.weight is not None)
     return _loops[key]
 
 
 def rates_for(model: Model, weighting: Weighting) -> Rates:
     """Return what a method needs to know of the simulated rate."""
     kernel = model.kernel
+    weighted = weighting.weight is not None
     return Rates(
-        kernel.parameters,
+        (*kernel.parameters, *weighting.parameters),
         weighting.arrays(kernel),
         weighting.bounds(kernel),
-        kernel.cheap,
-        kernel.rigorous,
+        kernel.cheap and weighting.cheap,
+        kernel.rigorous and weighting.rigorous,
         weighting.majorant(kernel),
+        kernel if weighted else None,
+        weighting.weights if weighted else None,
     )
 
 

@@ -20,7 +20,7 @@ from .model import Model
 from .model_dict import model_from_dict, model_to_dict
 from .plan import Plan
 from .replicas import Group
-from .weighting import WEIGHTINGS
+from .weighting import WEIGHTINGS, Weighting
 
 #: what reading a file that is no checkpoint, or half of one, may raise
 _UNREADABLE = (
@@ -31,12 +31,22 @@ _UNREADABLE = (
 VERSION = 1
 
 
+def _weighting_to_dict(weighting: Weighting) -> dict[str, Any]:
+    settings = asdict(weighting)  # type: ignore[call-overload]
+    if any(callable(value) for value in settings.values()):
+        raise InputError(
+            "the weight is a Python function, which no checkpoint holds; write it as a formula in "
+            "l, or as a power of the size"
+        )
+    return {"name": weighting.name, **settings}
+
+
 def _plan_to_dict(plan: Plan) -> dict[str, Any]:
     return {
         "model": model_to_dict(plan.model),
         "times": list(plan.times),
         "method": {"name": plan.method.name, **asdict(plan.method)},  # type: ignore[call-overload]
-        "weighting": {"name": plan.weighting.name, **asdict(plan.weighting)},  # type: ignore[call-overload]
+        "weighting": _weighting_to_dict(plan.weighting),
         "reason": plan.reason,
         "population": plan.population,
         "particles": plan.particles,

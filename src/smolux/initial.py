@@ -8,7 +8,7 @@ particle of its share and the expected counts are exact.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -33,6 +33,8 @@ _LARGEST = 1 << 61
 #: distributions up to this size are sampled size by size, others particle by particle in batches
 _TABULATED = 1 << 20
 _BATCH = 1 << 22
+#: distributions up to this size can be weighted
+_WEIGHTED = 1 << 22
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,22 @@ class Initial:
         """The largest size that is present, or beyond which a share of 1e-16 lies."""
         return int(self.quantile(np.array([_BELOW_ONE]))[0])
 
+    def weighted(self, weights: Callable[[Float], Float]) -> Initial:
+        """Return the law whose densities are those of this one times ``weights(sizes)``.
+
+        Raises
+        ------
+        InputError
+            If there are too many sizes.
+        """
+        if self.largest > _WEIGHTED:
+            raise InputError(
+                f"{self!r}: reaches the size {self.largest:.3g}; with a weighting other than "
+                f"'number' initial sizes go to {_WEIGHTED} at most, or are listed one by one"
+            )
+        densities = self.densities(self.largest)
+        return Tabulated(densities * weights(np.arange(1.0, self.largest + 1.0)))
+
     def sample(self, particles: int, u: float) -> tuple[Int, Int]:
         """Draw a population by systematic sampling.
 
@@ -94,6 +112,42 @@ class Initial:
         ]
         size, inverse = np.unique(np.concatenate([s for s, _ in drawn]), return_inverse=True)
         return size, np.bincount(inverse, np.concatenate([c for _, c in drawn])).astype(np.int64)
+
+
+class Tabulated(Initial):
+    """Number densities of the sizes 1, 2, ..., as an array."""
+
+    name: ClassVar[str] = "tabulated"
+
+    def __init__(self, densities: Float) -> None:
+        self._densities = densities
+
+    @property
+    def total(self) -> float:
+        """See `Initial.total`."""
+        return float(self._densities.sum())
+
+    @property
+    def largest(self) -> int:
+        """See `Initial.largest`."""
+        return len(self._densities)
+
+    def cumulative(self, sizes: Float) -> Float:
+        """See `Initial.cumulative`."""
+        shares = np.concatenate(([0.0], np.cumsum(self._densities)))
+        return (shares / shares[-1])[np.clip(sizes, 0, self.largest).astype(np.int64)]
+
+    def quantile(self, share: Float) -> Int:
+        """See `Initial.quantile`."""
+        shares = np.cumsum(self._densities)
+        place = np.searchsorted(shares / shares[-1], share, side="right")
+        return np.asarray(np.minimum(place, self.largest - 1) + 1, np.int64)
+
+    def densities(self, largest: int) -> Float:
+        """See `Initial.densities`."""
+        found = np.zeros(largest)
+        found[: min(largest, self.largest)] = self._densities[:largest]
+        return found
 
 
 def _number(value: Any) -> Any:
@@ -170,6 +224,11 @@ class Sizes(Initial):
         """See `Initial.quantile`."""
         index = np.searchsorted(self._shares(), share, side="right")
         return np.asarray(self.sizes, np.int64)[np.minimum(index, len(self.sizes) - 1)]
+
+    def weighted(self, weights: Callable[[Float], Float]) -> Initial:
+        """See `Initial.weighted`."""
+        found = np.array(self.densities_) * weights(np.array(self.sizes, float))
+        return Sizes(self.sizes, tuple(found.tolist()))
 
     def densities(self, largest: int) -> Float:
         """See `Initial.densities`; exact, not a difference of shares."""

@@ -45,7 +45,7 @@ def to_records(plan: Plan, groups: Sequence[Group]) -> Records:
         orders=np.array(plan.orders),
         processes=tuple(process.name for process in plan.model.processes),
         bin_edges=np.append(edges, 2.0**62)[: used + 1],
-        number_density=particles / volume,
+        number_density=_number_density(plan, groups, particles, volume),
         largest=largest,
         particles=particles,
         collisions=collisions,
@@ -63,6 +63,16 @@ def to_records(plan: Plan, groups: Sequence[Group]) -> Records:
     )
 
 
+def _number_density(
+    plan: Plan, groups: Sequence[Group], particles: Float, volume: Float
+) -> Float:
+    if plan.weighting.weight is None:
+        return particles / volume
+    weights = plan.weighting.stands_for(np.arange(1.0, plan.sizes + 1.0))
+    stood = [g.tally.counts[:, :, 1:] @ weights + g.tally.bins.sum(axis=-1) for g in groups]
+    return np.asarray(np.concatenate(stood) / volume)
+
+
 def observable(plan: Plan, groups: Sequence[Group]) -> tuple[Float, NDArray[np.bool_]]:
     """Return what the goal of a plan is about, at all output times of replicas that are done.
 
@@ -75,7 +85,7 @@ def observable(plan: Plan, groups: Sequence[Group]) -> tuple[Float, NDArray[np.b
     assert plan.goal is not None
     scalars = np.concatenate([g.tally.scalars for g in groups])
     _, particles, collisions, volume, largest = np.moveaxis(scalars, -1, 0)
-    values = particles / volume
+    values = _number_density(plan, groups, particles, volume)
     if plan.goal.target == "largest":
         values = largest
     elif plan.goal.size is not None:

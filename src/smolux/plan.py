@@ -16,6 +16,7 @@ from .assembly import rates_for
 from .core.state import Grid
 from .errors import InputError, did_you_mean
 from .goal import Goal, make_goal, whole
+from .initial import Initial
 from .methods import METHODS
 from .methods.auto import Auto, choose
 from .methods.base import Method
@@ -46,10 +47,18 @@ class Plan:
     #: what replicas are added for; `replicas` are those planned so far
     goal: Goal | None = None
 
+    @cached_property
+    def start(self) -> Initial:
+        """The law of the simulated particles at the start: ``z_k = w(k) n_k``."""
+        initial = self.model.initial
+        if self.weighting.weight is None:
+            return initial
+        return initial.weighted(self.weighting.weights)
+
     @property
     def volume(self) -> float:
         """Volume simulated at the start."""
-        return self.particles / self.model.initial.total
+        return self.particles / self.start.total
 
     @cached_property
     def grid(self) -> Grid:
@@ -129,6 +138,7 @@ def make_plan(
         **found,
         **numbers,  # type: ignore[arg-type]
     )
+    plan.start  # noqa: B018  initial sizes that cannot be weighted are refused here
     if isinstance(plan.method, Auto):
         plan = _with_method(plan)
     check_memory(plan)

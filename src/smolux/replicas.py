@@ -126,7 +126,7 @@ class Group:
             self.tally,
             self.windows,
             plan.grid,
-            plan.model.kernel.parameters,
+            (*plan.model.kernel.parameters, *plan.weighting.parameters),
             factor_parameters(plan.model.processes),
             codes,
             budget,
@@ -205,7 +205,7 @@ class Group:
 
 
 def _population(plan: Plan, replica: int) -> tuple[Int, Int]:
-    initial = plan.model.initial
+    initial = plan.start
     if isinstance(initial, Sizes) and len(initial.sizes) == 1:  # nothing to draw
         return np.array(initial.sizes), np.array([plan.particles])
     sequence = np.random.SeedSequence(plan.entropy, spawn_key=(replica, 1))

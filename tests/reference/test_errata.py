@@ -485,3 +485,42 @@ class TestPairsWithItself:
         pairs = number[:, None] * number
         assert pairs.sum() / 2 == 32
         assert (pairs - np.diag(number)).sum() / 2 == math.comb(8, 2)
+
+
+class TestWeightAlgorithm:
+    """Entries 17 and 18: no W_max in the rate, and a mean step that is printed as a rate."""
+
+    @staticmethod
+    def second_moment(q: float, factor: float, rng: random.Random, n0: int = 60) -> float:
+        """Run the algorithm for K = 1 up to t = 5; all rates are multiplied by `factor`."""
+        sizes, t, highest = [1] * n0, 0.0, 2.0**q
+        while True:
+            left = len(sizes)
+            t += rng.expovariate(factor * left * (left - 1) * highest / (2 * n0))
+            if t > 5.0:
+                return sum(size ** (2 - q) for size in sizes) / n0
+            a, b = rng.sample(range(left), 2)
+            i, j = sizes[a], sizes[b]
+            if rng.random() * highest < ((i + j) / (i * j)) ** q:
+                u = rng.random()
+                gone = {a} if u < (i / (i + j)) ** q else set()
+                gone |= {b} if 1 - u < (j / (i + j)) ** q else set()
+                sizes = [size for k, size in enumerate(sizes) if k not in gone] + [i + j]
+
+    def test_second_moment(self) -> None:
+        rng = random.Random(3)
+        found = [self.second_moment(0.5, 1.0, rng) for _ in range(400)]
+        assert np.mean(found) == pytest.approx(5.87, abs=4 * np.std(found) / 20)
+        printed = [self.second_moment(0.5, 2**-0.5, rng) for _ in range(400)]
+        assert np.mean(printed) == pytest.approx(4.46, abs=4 * np.std(printed) / 20)
+
+    @pytest.mark.parametrize("q", [0.5, 1.0, 1.25])
+    def test_largest_rate(self, q: float) -> None:
+        i = np.arange(2.0, 61.0)
+        weighted = ((i[:, None] + i) / (i[:, None] * i)) ** q
+        assert weighted.argmax() == 0
+        additive = 0.5 * (i[:, None] + i) * weighted
+        assert additive.argmax() == len(i) - 1
+        left = np.arange(2, 100)
+        step = 2 * 100 / (left * (left - 1) * weighted.max())
+        assert (np.diff(step) < 0).all()

@@ -92,6 +92,9 @@ def test_mistakes_in_values_of_the_model_have_their_lines_too():
         ("times = [1, 10.0]", "times = [nan]", 19, "must be finite"),
         ("times = [1, 10.0]", "", 18, "run.times is missing"),
         ("times = [1, 10.0]", "times = { stop = 3 }", 19, "run.times.count is missing"),
+        ("seed = 3", 'weighting = "weight-function"', 18, "run.exponent is missing"),
+        ("seed = 3", "exponent = 0.5", 21, 'is for weighting = "weight-function"'),
+        ("seed = 3", 'weighting = "weight-function"\nexponent = 9', 22, "from -8 to 8"),
         (
             "times = [1, 10.0]",
             'times = { stop = 3, count = 5, spacing = "log" }',

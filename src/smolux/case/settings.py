@@ -37,6 +37,7 @@ class Run:
     seed: int | None = None
     method: str = "auto"
     weighting: str = "number"
+    exponent: float | None = None
     population: str = "doubling"
     orders: tuple[float, ...] = (0, 1, 2, 3)
     sizes: int = 1024
@@ -50,9 +51,17 @@ class Run:
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments of `smolux.simulate` that decide on the data."""
-        return {
-            k: v for k, v in asdict(self).items() if k not in ("checkpoint_every", "time_limit")
-        }
+        apart = ("checkpoint_every", "time_limit", "exponent")
+        given = {k: v for k, v in asdict(self).items() if k not in apart}
+        return given | {"weighting": self.weighted()}
+
+    def weighted(self) -> Any:
+        """Return the weighting: its name, or an object if it has a setting."""
+        if self.exponent is None:
+            return self.weighting
+        from ..weighting import WeightFunction
+
+        return WeightFunction(self.exponent)
 
 
 @dataclass(frozen=True)
@@ -104,6 +113,7 @@ def read_run(content: Any, problems: Problems) -> Run | None:
         "seed": table.integer("seed", None, 0),
         "method": table.choice("method", Run.method, ["auto", *(m.name for m in METHODS)]),
         "weighting": table.choice("weighting", Run.weighting, [w.name for w in WEIGHTINGS]),
+        "exponent": _exponent(table),
         "population": table.choice("population", Run.population, list(POPULATIONS)),
         "orders": read_orders(table),
         "sizes": table.integer("sizes", Run.sizes, 1, 10_000_000),
@@ -126,6 +136,23 @@ def read_run(content: Any, problems: Problems) -> Run | None:
     problems.add_error(("run",), InputError([f"{w}" for w in wrong]), keys)
     table.finish()
     return Run(times, **settings, **goal) if times and not wrong else None
+
+
+def _exponent(table: Table) -> float | None:
+    """Read the power of the size that is the weight."""
+    needed = table.content.get("weighting") == "weight-function"
+    if "exponent" not in table:
+        table.known.append("exponent")
+        if needed:
+            table.require("exponent", "the power q of the weight function l**q, such as 0.5")
+        return None
+    value: float | None = table.number("exponent", None)
+    if not needed:
+        table.bad("exponent", 'is for weighting = "weight-function"; take one of both out')
+        return None
+    if value is not None and not abs(value) <= 8:
+        table.bad("exponent", "must be a number from -8 to 8")
+    return value
 
 
 def read_parallel(content: Any, run: Run | None, problems: Problems) -> Parallel:

@@ -116,7 +116,7 @@ def _once(case: Case, particles: int) -> tuple[Any, bool]:
 
     try:
         ds = smolux.simulate(
-            case.model, times, method=run.method, weighting=run.weighting, particles=particles,
+            case.model, times, method=run.method, weighting=run.weighted(), particles=particles,
             replicas=1, seed=_SEED, orders=(0,), sizes=1, progress=halt,
         )  # fmt: skip
     except Interrupted as stop:

@@ -94,15 +94,16 @@ class Pieces(NamedTuple):
         rate of a pair that is present is none, which `note_bad` has noted.
     pair : ``pair(s, w)``
         Sizes of the chosen pair.
-    update : ``update(s, w, entries, p)``
-        Take the pair out and put the `entries` of ``s.sizes``, ``s.counts`` in; False, with
-        nothing changed, if there is no room.
+    update : ``update(s, w, gone, entries, p)``
+        Take the first of the pair out (bit 1 of `gone`) and the second (bit 2), and put the
+        `entries` of ``s.sizes``, ``s.counts`` in; False, with nothing changed, if there is no room.
     prepare : ``prepare(s, w, p)``
         Bring bounds up to date; 0 or the reason to return.
     double : ``double(s, w)``
         Put every particle in once more; False, with nothing changed, if there is no room.
-    visit : ``visit(s, w, t, grid)``
-        Call `tally_one` for the particles present and return the largest size.
+    visit : ``visit(s, w, t, grid, p)``
+        Call the `tally` that `Method.bind` was given for the particles present, and return the
+        largest size.
     """
 
     view: Any
@@ -145,6 +146,7 @@ def make_fire(
     update: Callable[..., Any],
     outcome: Callable[..., Any],
     factor: Callable[..., Any],
+    random: bool,
 ) -> Callable[..., Any]:
     """Bind what happens when the pending event comes: 0 or the reason to return."""
 
@@ -159,11 +161,15 @@ def make_fire(
                 s.count[PROCESS] = r
             if r >= 0:
                 i, j = pair(s, w)
-                entries = outcome(r, i, j, s.sizes, s.counts)
+                if random:  # the same numbers again, should there be no room
+                    a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
+                entries, gone = outcome(r, i, j, s, p, q)
                 for e in range(entries):
                     if s.sizes[e] >= LIMIT:
                         return TOO_LARGE
-                if not update(s, w, entries, p):
+                if not update(s, w, gone, entries, p):
+                    if random:
+                        s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
                     return GROW
                 s.count[EVENTS] += 1
                 s.count[SINCE] += 1
@@ -177,20 +183,26 @@ def make_fire(
     return fire
 
 
-@cold_piece
-def tally_one(t, grid, size, count):
-    """Add `count` particles of one size to an observation."""
-    if size < t.counts.shape[0]:
-        t.counts[size] += count
-        return
-    low, high = 0, grid.edges.shape[0]  # last edge at or below the size
+@piece
+def find_bin(grid, size):
+    """Bin of a size: the last edge at or below it."""
+    low, high = 0, grid.edges.shape[0]
     while high - low > 1:
         middle = (low + high) // 2
         if grid.edges[middle] <= size:
             low = middle
         else:
             high = middle
-    t.bins[low] += count
+    return low
+
+
+@cold_piece
+def tally_one(t, grid, size, count, p):
+    """Add `count` particles of one size to an observation."""
+    if size < t.counts.shape[0]:
+        t.counts[size] += count
+        return
+    t.bins[find_bin(grid, size)] += count
     x = float(size)
     for o in range(grid.orders.shape[0]):
         t.sums[o] += count * x ** grid.orders[o]
@@ -200,12 +212,12 @@ def make_record(visit: Callable[..., Any]) -> Callable[..., Any]:
     """Bind the recording of an observation."""
 
     @cold_piece
-    def record(s, w, t, grid, time):
+    def record(s, w, t, grid, time, p):
         t.scalars[0] = time
         t.scalars[1] = s.count[PARTICLES]
         t.scalars[2] = s.count[EVENTS]
         t.scalars[3] = s.clock[VOLUME]
-        t.scalars[4] = visit(s, w, t, grid)
+        t.scalars[4] = visit(s, w, t, grid, p)
         for r in range(s.events.shape[0]):
             t.events[r] = s.events[r]
 
@@ -213,7 +225,7 @@ def make_record(visit: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def make_loop(
-    pieces: Pieces, outcome: Callable[..., Any], factor: Callable[..., Any]
+    pieces: Pieces, outcome: Callable[..., Any], factor: Callable[..., Any], random: bool = False
 ) -> Callable[..., Any]:
     """Assemble and compile the loop.
 
@@ -222,9 +234,13 @@ def make_loop(
     pieces : Pieces
         Of the method.
     outcome : callable
-        ``outcome(r, i, j, sizes, counts)``: what process `r` makes of the sizes `i` and `j`.
+        ``outcome(r, i, j, s, p, q)``: writes what process `r` makes of the sizes `i` and `j` into
+        ``s.sizes`` and ``s.counts``; returns how many entries, and which of both vanishes (bits 1
+        and 2).
     factor : callable
         ``factor(r, t, q)``: its rate as a multiple of the kernel.
+    random : bool
+        Whether the outcome draws random numbers.
 
     Returns
     -------
@@ -234,7 +250,7 @@ def make_loop(
     """
     view, prepare, double = pieces.view, pieces.prepare, pieces.double
     next_event = make_next_event(pieces.draw)
-    fire = make_fire(pieces.pair, pieces.update, outcome, factor)
+    fire = make_fire(pieces.pair, pieces.update, outcome, factor, random)
     record = make_record(pieces.visit)
 
     @cold_piece
@@ -242,7 +258,7 @@ def make_loop(
         stop = s.count[TRIALS] + s.count[EVENTS] + budget
         while True:
             if s.count[PHASE] == DRAW:
-                while s.count[PARTICLES] <= s.count[DOUBLE_AT]:
+                while 0 < s.count[PARTICLES] <= s.count[DOUBLE_AT]:
                     if not double(s, w):
                         return GROW
                     s.clock[VOLUME] *= 2.0
@@ -274,6 +290,7 @@ def make_loop(
                     ),
                     grid,
                     grid.times[k],
+                    p,
                 )
                 s.count[NEXT] += 1
                 if s.count[PAUSE] == 1:

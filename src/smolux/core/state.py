@@ -105,9 +105,10 @@ class Tally(NamedTuple):
     events : int64 array of shape (R, T, P)
     counts : int64 array of shape (R, T, L + 1)
         Particles of the sizes ``1 .. L``; entry 0 is unused.
-    bins : int64 array of shape (R, T, B)
+    bins : float64 array of shape (R, T, B)
+        Particles they stand for.
     sums : float64 array of shape (R, T, O)
-        Sums of ``size**order`` over the sizes above L.
+        Sums of ``size**order`` over what stands for the sizes above L.
     """
 
     scalars: np.ndarray
@@ -145,6 +146,6 @@ def new_tally(replicas: int, grid: Grid, sizes: int, processes: int) -> Tally:
         np.full((*shape, 5), np.nan),
         np.zeros((*shape, processes), np.int64),
         np.zeros((*shape, sizes + 1), np.int64),
-        np.zeros((*shape, len(grid.edges)), np.int64),
+        np.zeros((*shape, len(grid.edges))),
         np.zeros((*shape, len(grid.orders))),
     )

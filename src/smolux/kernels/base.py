@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from smolux.errors import InputError
+from smolux.intervals import Interval
 
 from .majorant import Majorant
 
@@ -107,6 +108,16 @@ class Kernel:
             ``lower <= K(i, j) <= upper`` for every real pair in the box.
         """
         raise NotImplementedError
+
+    def interval(self, i: Interval, j: Interval) -> Interval:
+        """Bounds of the law over intervals of sizes, the best only where these are small.
+
+        Raises
+        ------
+        TypeError
+            If there are none but sampled ones.
+        """
+        return Interval(*self.bounds(i.lo, i.hi, j.lo, j.hi))
 
     def factors(self, sizes: Float) -> tuple[Float, Float] | None:
         """Factors ``u, v`` of shape (rank, sizes), ``K(i, j) = sum_r u[r, i] v[r, j]``, or None.

@@ -75,6 +75,10 @@ class FormulaKernel(Kernel):
         result = self.rate(i, j, *self.values)
         return result if isinstance(result, Interval) else Interval(float(result))
 
+    def interval(self, i: Interval, j: Interval) -> Interval:
+        """See `Kernel.interval`; by interval arithmetic."""
+        return self._interval(i, j)
+
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:
         """See `Kernel.bounds`; by interval arithmetic, sampled where that finds none."""
         lower, upper = interval_bounds(self._interval, a, b, c, d)

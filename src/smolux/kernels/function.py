@@ -85,6 +85,12 @@ class FunctionKernel(Kernel):
     def _interval(self, i: Interval, j: Interval) -> Interval:
         return self.user.interval((i, j), self.values)
 
+    def interval(self, i: Interval, j: Interval) -> Interval:
+        """See `Kernel.interval`; as `bounds`, but never sampled."""
+        if self.declared_bounds is not None:
+            return Interval(*self._declared(self.declared_bounds, i.lo, i.hi, j.lo, j.hi))
+        return self._interval(i, j)
+
     def __call__(self, i: ArrayLike, j: ArrayLike) -> Float:
         """See `Kernel.__call__`."""
         return self.user.evaluate((i, j), self.values)

@@ -11,7 +11,7 @@ import numpy as np
 from ..core import rng
 from ..core.compile import cold_piece, piece
 from ..core.levels import level_edges, level_of, renew_majorant
-from ..core.loop import Pieces, note_bad, note_largest, repair, tally_one
+from ..core.loop import Pieces, note_bad, note_largest, repair
 from ..core.prefetch import prefetch
 from ..core.state import (
     FIRST,
@@ -168,17 +168,21 @@ def _insert(s, w, size, count):
 
 
 @piece
-def _update(s, w, entries, p):
+def _update(s, w, gone, entries, p):
     needed = np.int64(1)
     for e in range(entries):
         needed += s.counts[e] if s.sizes[e] > 1 else 0
     if s.count[STORED] + needed > w.sizes.shape[0]:
         return False
     a, b = s.count[FIRST], s.count[SECOND]
-    # monomers are numbered first: taking the later slot first keeps the number of the other
-    _remove(s, w, max(a, b))
-    _remove(s, w, min(a, b))
-    s.count[PARTICLES] -= 2
+    if gone == 3:
+        # monomers are numbered first: taking the later slot first keeps the number of the other
+        _remove(s, w, max(a, b))
+        _remove(s, w, min(a, b))
+        s.count[PARTICLES] -= 2
+    elif gone > 0:
+        _remove(s, w, a if gone == 1 else b)
+        s.count[PARTICLES] -= 1
     for e in range(entries):
         _insert(s, w, s.sizes[e], s.counts[e])
     return True
@@ -218,16 +222,19 @@ def _double(s, w):
     return True
 
 
-@cold_piece
-def _visit(s, w, t, grid):
-    largest = np.int64(0)
-    if s.count[MONOMERS] > 0:
-        tally_one(t, grid, np.int64(1), s.count[MONOMERS])
-        largest = np.int64(1)
-    for k in range(s.count[STORED]):
-        tally_one(t, grid, w.sizes[k], 1)
-        largest = max(largest, w.sizes[k])
-    return largest
+def _make_visit(tally: Any) -> Any:
+    @cold_piece
+    def visit(s, w, t, grid, p):
+        largest = np.int64(0)
+        if s.count[MONOMERS] > 0:
+            tally(t, grid, np.int64(1), s.count[MONOMERS], p)
+            largest = np.int64(1)
+        for k in range(s.count[STORED]):
+            tally(t, grid, w.sizes[k], 1, p)
+            largest = max(largest, w.sizes[k])
+        return largest
+
+    return visit
 
 
 @dataclass(frozen=True)
@@ -250,9 +257,10 @@ class AcceptanceRejection(Method):
     work_type: ClassVar[type] = Work
 
     @staticmethod
-    def bind(rate: Any) -> Pieces:
+    def bind(rate: Any, tally: Any) -> Pieces:
         """See `Method.bind`."""
-        return Pieces(_view, _make_draw(rate), _pair, _update, _prepare, _double, _visit)
+        visit = _make_visit(tally)
+        return Pieces(_view, _make_draw(rate), _pair, _update, _prepare, _double, visit)
 
     def new_work(
         self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -62,9 +62,17 @@ class _Grid:
         steps = np.arange(int(_PER_OCTAVE * math.log2(max(largest, 8.0))) + 2)
         self.size = np.unique(np.round(2.0 ** (steps / _PER_OCTAVE)))
         self.i, self.j = np.triu_indices(len(self.size))
-        rate = rates.arrays(self.size[self.i], self.size[self.j])
-        rate = np.where(np.isfinite(rate), rate, 0.0)
-        self.rate = np.where(self.i == self.j, 0.5 * rate, rate)
+        half = np.where(self.i == self.j, 0.5, 1.0)
+        pairs = self.size[self.i], self.size[self.j]
+
+        def table(law: Callable[[Any, Any], Float]) -> Float:
+            rate = law(*pairs)
+            return np.where(np.isfinite(rate), half * rate, 0.0)
+
+        self.rate = table(rates.physical or rates.arrays)
+        #: simulated particles for a particle of each size, and the rate of their pairs
+        self.weight = np.ones(len(self.size)) if rates.weights is None else rates.weights(self.size)
+        self.simulated = self.rate if rates.weights is None else table(rates.arrays)
         self.processes = processes
         self.gain = [self._gain(process) for process in processes]
 
@@ -95,9 +103,9 @@ class _Grid:
         return np.asarray(np.bincount(place, number, len(self.size)), float)
 
     def course(self, density: float, start: Float, end: float) -> list[tuple[Float, float, float]]:
-        """Follow the densities; with the mean rate, and the encounters for each particle present.
+        """Follow the densities; with the mean rate, and the events for each particle present.
 
-        One entry a step.
+        One entry a step, all as the simulated particles have them.
         """
         one = np.full(len(start), density / len(start))
         n = self._sum(*self._spread(start, one))
@@ -109,6 +117,8 @@ class _Grid:
             number, events = float(n.sum()), float(met.sum()) * total
             if not events > 0.0:
                 break
+            z = n * self.weight
+            mean = float((self.simulated * z[self.i] * z[self.j]).sum()) / float(z.sum()) ** 2
             share = min(_CHANGE, _FIRST * _RAMP**k)
             step = min(share * number / events, end - t)
             gain = sum(
@@ -120,13 +130,14 @@ class _Grid:
             # implicit in the loss: no density gets negative, however long the step
             new = (n + step * gain) / (1.0 + step * total * lost)
             new *= mass / (new @ self.size)
-            found.append((new, 2.0 * float(met.sum()) / number**2, events * step / number))
+            found.append((new * self.weight, 2.0 * mean, mean * float(z.sum()) * total * step))
             steady = share == _CHANGE and np.abs(new - n).sum() < _STEADY * number
             n, t = new, t + step
             if t >= end or steady:
                 break
         if found and t < end:  # the rest at the last state
-            found.append((n, found[-1][1], found[-1][1] * 0.5 * float(n.sum()) * total * (end - t)))
+            z = n * self.weight
+            found.append((z, found[-1][1], found[-1][1] * 0.5 * float(z.sum()) * total * (end - t)))
         return found
 
 

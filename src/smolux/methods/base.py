@@ -34,6 +34,10 @@ class Rates:
         Whether `bounds` is proved.
     majorant : Majorant, optional
         A majorant of low rank for all sizes, if one is known.
+    physical : callable, optional
+        The rate of the kernel on arrays of sizes, if it is another one.
+    weights : callable, optional
+        ``weights(sizes)``: simulated particles for a particle of each size, if not one.
     """
 
     parameters: tuple[float, ...]
@@ -42,6 +46,8 @@ class Rates:
     cheap: bool
     rigorous: bool
     majorant: Majorant | None = None
+    physical: Callable[[Any, Any], Float] | None = None
+    weights: Callable[[Any], Float] | None = None
 
     def table(self, largest: int) -> Float:
         """Rates of the sizes ``1 .. largest`` with each other."""
@@ -69,8 +75,11 @@ class Method:
     work_type: ClassVar[type]
 
     @staticmethod
-    def bind(rate: Any) -> Pieces:
-        """Return the compiled pieces for a rate, the compiled ``rate(i, j, *p)``."""
+    def bind(rate: Any, tally: Any) -> Pieces:
+        """Return the compiled pieces for a rate, the compiled ``rate(i, j, *p)``.
+
+        `tally` is what counts particles, see `smolux.core.loop.tally_one`.
+        """
         raise NotImplementedError
 
     def new_work(

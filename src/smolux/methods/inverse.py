@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core import rng
 from ..core.compile import cold_piece, piece
-from ..core.loop import Pieces, note_bad, note_largest, tally_one
+from ..core.loop import Pieces, note_bad, note_largest
 from ..core.state import (
     FIRST,
     LARGEST,
@@ -121,17 +121,20 @@ def _double(s, w):
     return True
 
 
-@cold_piece
-def _visit(s, w, t, grid):
-    largest = np.int64(0)
-    for k in range(w.table.shape[1]):
-        if w.number[k] > 0.0:
-            largest = np.int64(k + 1)
-            tally_one(t, grid, largest, np.int64(w.number[k]))
-    for d in range(s.count[STORED]):
-        tally_one(t, grid, w.large[d], 1)
-        largest = max(largest, w.large[d])
-    return largest
+def _make_visit(tally: Any) -> Any:
+    @cold_piece
+    def visit(s, w, t, grid, p):
+        largest = np.int64(0)
+        for k in range(w.table.shape[1]):
+            if w.number[k] > 0.0:
+                largest = np.int64(k + 1)
+                tally(t, grid, largest, np.int64(w.number[k]), p)
+        for d in range(s.count[STORED]):
+            tally(t, grid, w.large[d], 1, p)
+            largest = max(largest, w.large[d])
+        return largest
+
+    return visit
 
 
 def _make_rates(rate: Any) -> tuple[Any, Any, Any, Any]:
@@ -285,7 +288,10 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any, look: Any) -> Any:
             w.rate[0, k] = own_rate(s, w, np.int64(k + 1), -1, p)
 
     @cold_piece
-    def update(s, w, entries, p):
+    def update(s, w, gone, entries, p):
+        if entries == 0:  # what is gone is accounted for beside what appears
+            s.sizes[0], s.counts[0] = 1, 0
+            entries = 1
         buckets = w.table.shape[1]
         needed = 0
         for e in range(entries):
@@ -295,14 +301,21 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any, look: Any) -> Any:
             return False
         for e in range(entries):
             reach(s, w, s.sizes[e], p)
-        i, j = _pair(s, w)
         a, b = s.count[FIRST], s.count[SECOND]
-        # the last large particle moves into a gap: the later slot goes first, so the other stays
-        _remove(s, w, max(a, b))
-        _remove(s, w, min(a, b))
+        i = j = np.int64(1)
+        if gone == 3:
+            i, j = _pair(s, w)
+            # the last large particle moves into a gap: the later slot first, so the other stays
+            _remove(s, w, max(a, b))
+            _remove(s, w, min(a, b))
+        elif gone > 0:
+            one = a if gone == 1 else b
+            i = j = _size(w, one)
+            _remove(s, w, one)
+        # of both; half of either if it is one
+        share = 1.0 if gone == 3 else 0.5 if gone > 0 else 0.0
         for e in range(entries):
-            gone = 1.0 if e == 0 else 0.0
-            account(s, w, i, j, gone, s.sizes[e], s.counts[e], p)
+            account(s, w, i, j, share if e == 0 else 0.0, s.sizes[e], s.counts[e], p)
             arrive(s, w, s.sizes[e], s.counts[e], p)
         return True
 
@@ -364,7 +377,7 @@ class Inverse(Method):
     work_type: ClassVar[type] = Work
 
     @staticmethod
-    def bind(rate: Any) -> Pieces:
+    def bind(rate: Any, tally: Any) -> Pieces:
         """See `Method.bind`."""
         pair_rate, row_of, own_rate, look = _make_rates(rate)
         return Pieces(
@@ -374,7 +387,7 @@ class Inverse(Method):
             _make_update(pair_rate, row_of, own_rate, look),
             _make_prepare(own_rate, look),
             _double,
-            _visit,
+            _make_visit(tally),
         )
 
     def __post_init__(self) -> None:

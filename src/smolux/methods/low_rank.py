@@ -33,8 +33,8 @@ from .low_rank_store import (
     WANTED,
     Work,
     double,
+    make_visit,
     view,
-    visit,
 )
 from .majorants import Tables, fill_bounds, fitted, from_powers
 
@@ -82,9 +82,9 @@ class LowRank(Method):
             raise InputError(f"bits = {self.bits!r}: must be a whole number from 0 to 8")
 
     @staticmethod
-    def bind(rate: Any) -> Pieces:
+    def bind(rate: Any, tally: Any) -> Pieces:
         """See `Method.bind`."""
-        return Pieces(view, make_draw(rate), pair, update, prepare, double, visit)
+        return Pieces(view, make_draw(rate), pair, update, prepare, double, make_visit(tally))
 
     def _tables(self, rates: Rates) -> tuple[Tables, np.ndarray, int]:
         """Return tables, an array for bounds of the kernel and the bits in use."""

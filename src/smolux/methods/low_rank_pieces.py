@@ -207,8 +207,32 @@ def _account(w, stage, a, b, c, count):
 
 
 @piece
-def update(s, w, entries, p):
-    """Take the pair out and put in what appears; False if there is no room."""
+def _take_out(s, w, gone):
+    """Take one of the pair out, or both; return their slots, 0 for one that stays."""
+    a, b = w.chosen[0], w.chosen[2]
+    if gone == 3:
+        if a == b and w.chosen[1] < w.chosen[3]:  # the later place first: the other one stays
+            remove(s, w, b, w.chosen[3])
+            remove(s, w, a, w.chosen[1])
+        else:
+            remove(s, w, a, w.chosen[1])
+            remove(s, w, b, w.chosen[3])
+        s.count[PARTICLES] -= 2
+        return a, b
+    if gone == 0:
+        return np.int64(0), np.int64(0)
+    slot, place = (a, w.chosen[1]) if gone == 1 else (b, w.chosen[3])
+    remove(s, w, slot, place)
+    s.count[PARTICLES] -= 1
+    return slot, np.int64(0)
+
+
+@piece
+def update(s, w, gone, entries, p):
+    """Take out what vanishes and put in what appears; False if there is no room."""
+    if entries == 0:  # what is gone is accounted for beside what appears
+        s.sizes[0], s.counts[0] = 1, 0
+        entries = 1
     slots = w.number.shape[0]
     for e in range(entries):
         c = slot_for(w, s.sizes[e])
@@ -221,14 +245,7 @@ def update(s, w, entries, p):
         if not has_room(w, slot_for(w, s.sizes[e]), s.counts[e]):
             w.meta[POOL_NEEDED] = 2 * w.pool.shape[0]
             return False
-    a, b = w.chosen[0], w.chosen[2]
-    if a == b and w.chosen[1] < w.chosen[3]:  # the later place first: the other one stays
-        remove(s, w, b, w.chosen[3])
-        remove(s, w, a, w.chosen[1])
-    else:
-        remove(s, w, a, w.chosen[1])
-        remove(s, w, b, w.chosen[3])
-    s.count[PARTICLES] -= 2
+    a, b = _take_out(s, w, gone)
     stage = w.meta[STAGE]
     for e in range(entries):
         c = slot_for(w, s.sizes[e])

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.compile import cold_piece, piece
-from ..core.loop import tally_one
 from ..core.slots import slot_of
 from ..core.state import LARGEST, PARTICLES, SINCE, STORED
 
@@ -249,20 +248,24 @@ def double(s, w):
     return True
 
 
-@cold_piece
-def visit(s, w, t, grid):
-    """Count all particles, for output."""
-    largest = np.int64(0)
-    for slot in range(w.number.shape[0]):
-        n = np.int64(w.number[slot])
-        if n > 0 and slot < counted(w):
-            tally_one(t, grid, np.int64(slot), n)
-            largest = max(largest, np.int64(slot))
-        elif n > 0:
-            for k in range(w.start[slot], w.start[slot] + n):
-                tally_one(t, grid, w.pool[k], 1)
-                largest = max(largest, w.pool[k])
-    return largest
+def make_visit(tally):
+    """Bind the counting of all particles, for output."""
+
+    @cold_piece
+    def visit(s, w, t, grid, p):
+        largest = np.int64(0)
+        for slot in range(w.number.shape[0]):
+            n = np.int64(w.number[slot])
+            if n > 0 and slot < counted(w):
+                tally(t, grid, np.int64(slot), n, p)
+                largest = max(largest, np.int64(slot))
+            elif n > 0:
+                for k in range(w.start[slot], w.start[slot] + n):
+                    tally(t, grid, w.pool[k], 1, p)
+                    largest = max(largest, w.pool[k])
+        return largest
+
+    return visit
 
 
 @cold_piece

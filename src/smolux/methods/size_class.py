@@ -53,9 +53,9 @@ class SizeClass(Method):
     work_type: ClassVar[type] = Work
 
     @staticmethod
-    def bind(rate: Any) -> Pieces:
+    def bind(rate: Any, tally: Any) -> Pieces:
         """See `Method.bind`."""
-        return pieces.bind(rate)
+        return pieces.bind(rate, tally)
 
     def __post_init__(self) -> None:
         if self.classes not in (0, 1, 2, 4, 8, 16):

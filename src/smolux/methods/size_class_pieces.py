@@ -21,11 +21,11 @@ from .size_class_store import (
     double,
     fits,
     insert,
+    make_visit,
     place,
     remove,
     size_at,
     view,
-    visit,
 )
 from .size_class_table import prepare
 
@@ -110,19 +110,24 @@ def _make_draw(rate: Any) -> Any:
 
 
 @piece
-def _update(s, w, entries, p):
+def _update(s, w, gone, entries, p):
     if not fits(s, w, entries):
         return False
     a, b = s.count[FIRST], s.count[SECOND]
-    # the later place of a class goes first: then the other stays where it is
-    remove(s, w, max(a, b) >> _SLOT_BITS, max(a, b) & _SLOT)
-    remove(s, w, min(a, b) >> _SLOT_BITS, min(a, b) & _SLOT)
-    s.count[PARTICLES] -= 2
+    if gone == 3:
+        # the later place of a class goes first: then the other stays where it is
+        remove(s, w, max(a, b) >> _SLOT_BITS, max(a, b) & _SLOT)
+        remove(s, w, min(a, b) >> _SLOT_BITS, min(a, b) & _SLOT)
+        s.count[PARTICLES] -= 2
+    elif gone > 0:
+        one = a if gone == 1 else b
+        remove(s, w, one >> _SLOT_BITS, one & _SLOT)
+        s.count[PARTICLES] -= 1
     for e in range(entries):
         insert(s, w, s.sizes[e], s.counts[e])
     return True
 
 
-def bind(rate: Any) -> Pieces:
-    """Bind the pieces to a rate."""
-    return Pieces(view, _make_draw(rate), _pair, _update, prepare, double, visit)
+def bind(rate: Any, tally: Any) -> Pieces:
+    """Bind the pieces to a rate and a way to count."""
+    return Pieces(view, _make_draw(rate), _pair, _update, prepare, double, make_visit(tally))

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.compile import cold_piece, piece
-from ..core.loop import tally_one
 from ..core.pool import place_of, return_chunk, take_chunk
 from ..core.slots import slot_of
 from ..core.state import PARTICLES
@@ -203,19 +202,23 @@ def double(s, w):
     return True
 
 
-@cold_piece
-def visit(s, w, t, grid):
-    """Count all particles, for output."""
-    largest = np.int64(0)
-    for g in range(1, w.number.shape[0]):
-        if w.number[g] == 0:
-            continue
-        if not w.listed[g]:
-            tally_one(t, grid, np.int64(g), w.number[g])
-            largest = np.int64(g)
-            continue
-        for slot in range(w.number[g]):
-            size = size_at(w, g, slot)
-            tally_one(t, grid, size, 1)
-            largest = max(largest, size)
-    return largest
+def make_visit(tally):
+    """Bind the counting of all particles, for output."""
+
+    @cold_piece
+    def visit(s, w, t, grid, p):
+        largest = np.int64(0)
+        for g in range(1, w.number.shape[0]):
+            if w.number[g] == 0:
+                continue
+            if not w.listed[g]:
+                tally(t, grid, np.int64(g), w.number[g], p)
+                largest = np.int64(g)
+                continue
+            for slot in range(w.number[g]):
+                size = size_at(w, g, slot)
+                tally(t, grid, size, 1, p)
+                largest = max(largest, size)
+        return largest
+
+    return visit

@@ -1,9 +1,11 @@
 """What one simulated particle stands for: one file per weighting."""
 
 from .base import Weighting
+from .mass_flow import MassFlow
 from .number import Number
+from .weight_function import WeightFunction
 
 #: every weighting
-WEIGHTINGS: tuple[type[Weighting], ...] = (Number,)
+WEIGHTINGS: tuple[type[Weighting], ...] = (Number, MassFlow, WeightFunction)
 
-__all__ = ["WEIGHTINGS", "Number", "Weighting"]
+__all__ = ["WEIGHTINGS", "MassFlow", "Number", "WeightFunction", "Weighting"]

@@ -6,16 +6,27 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ..intervals import Interval
 from ..kernels.base import Kernel
 from ..kernels.majorant import Majorant
+from ..kernels.numeric import interval_bounds, sampled_bounds
 
 Float = NDArray[np.float64]
 
 
 class Weighting:
-    """Turns the kernel into the simulated pair rate and counts into number densities.
+    """A simulated particle of size l stands for ``1 / w(l)`` particles.
+
+    The densities ``z_l = w(l) n_l`` are simulated. A pair of the sizes i and j has an event at
+    the rate ``K(i, j) W / (w(i) w(j))``, with W the largest of ``w(i)``, ``w(j)`` and ``w(i + j)``.
+    In it i vanishes with probability ``w(i) / W``, j with probability ``w(j) / W``, and of a size k
+    that appears c times ``c w(k) / W`` are put in on average. So the densities obey the rate
+    equations of the model whatever w is; see the page on weightings.
+
+    A weighting gives `weight`; all else follows. It is a plain function of numbers, arrays and, if
+    `rigorous`, intervals, and compiles with Numba.
 
     Attributes
     ----------
@@ -24,23 +35,90 @@ class Weighting:
     """
 
     name: ClassVar[str]
+    #: whether what it adds to a rate costs no more than reading a table
+    cheap: ClassVar[bool] = False
 
-    def compiled(self, rate: Any) -> Any:
-        """Return the simulated rate as a compiled piece, from the compiled rate of the kernel."""
+    @property
+    def weight(self) -> Callable[..., Any] | None:
+        """``weight(l, *parameters)``: w; None if it is one for all sizes."""
+        raise NotImplementedError
+
+    @property
+    def factor(self) -> Callable[..., Any] | None:
+        """``factor(i, j, *parameters)``: the simulated rate over that of the kernel.
+
+        None if there is no shorter form than by the definition.
+        """
+        return None
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        """What `weight` and `factor` take after the sizes."""
+        return ()
+
+    @property
+    def rigorous(self) -> bool:
+        """Whether bounds of the simulated rate are proved where those of the kernel are."""
+        return True
+
+    def weights(self, sizes: ArrayLike) -> Float:
+        """Evaluate w on an array of sizes."""
+        assert self.weight is not None
+        sizes = np.asarray(sizes, float)
+        return np.asarray(np.broadcast_to(self.weight(sizes, *self.parameters), sizes.shape), float)
+
+    def stands_for(self, sizes: ArrayLike) -> Float:
+        """How many physical particles a simulated particle of each size stands for."""
+        return 1.0 / self.weights(sizes)
+
+    def factors(self, i: ArrayLike, j: ArrayLike) -> Float:
+        """Return the simulated rate over that of the kernel, on arrays of sizes."""
+        i, j = np.broadcast_arrays(np.asarray(i, float), np.asarray(j, float))
+        with np.errstate(all="ignore"):
+            if self.factor is not None:
+                return np.asarray(self.factor(i, j, *self.parameters), float)
+            one, two = self.weights(i), self.weights(j)
+            return np.maximum(np.maximum(one, two), self.weights(i + j)) / (one * two)
+
+    def interval(self, i: Interval, j: Interval) -> Interval:
+        """Bounds of the same over intervals of sizes; `TypeError` if there are none."""
         raise NotImplementedError
 
     def arrays(self, kernel: Kernel) -> Callable[[Any, Any], Float]:
         """Return the simulated rate on arrays of sizes."""
-        raise NotImplementedError
+
+        def rate(i: Any, j: Any) -> Float:
+            with np.errstate(all="ignore"):
+                return np.asarray(kernel(i, j) * self.factors(i, j))
+
+        return rate
 
     def bounds(self, kernel: Kernel) -> Callable[..., tuple[Float, Float]]:
-        """Return the bounds of the simulated rate, see `smolux.kernels.base.Kernel.bounds`."""
-        raise NotImplementedError
+        """Return the bounds of the simulated rate, see `smolux.kernels.base.Kernel.bounds`.
+
+        Those of kernel and factor over small boxes, multiplied: over a large one both need not be
+        attained for the same pair.
+        """
+
+        def cell(i: Interval, j: Interval) -> Interval:
+            return kernel.interval(i, j) * self.interval(i, j)
+
+        def found(a: Any, b: Any, c: Any, d: Any) -> tuple[Float, Float]:
+            try:
+                lower, upper = interval_bounds(cell, a, b, c, d)
+            except TypeError:
+                return sampled_bounds(self.arrays(kernel), a, b, c, d)
+            known = np.isfinite(upper)
+            if not known.all():
+                sampled = sampled_bounds(self.arrays(kernel), a, b, c, d)
+                lower, upper = (
+                    np.where(known, one, other)
+                    for one, other in zip((lower, upper), sampled, strict=True)
+                )
+            return lower, upper
+
+        return found
 
     def majorant(self, kernel: Kernel) -> Majorant | None:
         """Return a majorant of the simulated rate; None if none is known, see `bounds` then."""
         return None
-
-    def stands_for(self, sizes: Float) -> Float:
-        """How many physical particles a simulated particle of each size stands for."""
-        raise NotImplementedError

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..kernels.base import Kernel
 from ..kernels.majorant import Majorant
@@ -22,10 +23,16 @@ class Number(Weighting):
     """
 
     name: ClassVar[str] = "number"
+    cheap: ClassVar[bool] = True
 
-    def compiled(self, rate: Any) -> Any:
-        """See `Weighting.compiled`."""
-        return rate
+    @property
+    def weight(self) -> None:
+        """See `Weighting.weight`."""
+        return None
+
+    def weights(self, sizes: ArrayLike) -> Float:
+        """See `Weighting.weights`."""
+        return np.ones(np.shape(sizes))
 
     def arrays(self, kernel: Kernel) -> Callable[[Any, Any], Float]:
         """See `Weighting.arrays`."""
@@ -38,7 +45,3 @@ class Number(Weighting):
     def majorant(self, kernel: Kernel) -> Majorant | None:
         """See `Weighting.majorant`."""
         return kernel.majorant()
-
-    def stands_for(self, sizes: Float) -> Float:
-        """See `Weighting.stands_for`."""
-        return np.ones(np.shape(sizes))

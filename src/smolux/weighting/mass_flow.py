@@ -1,0 +1,54 @@
+"""Mass flow: one simulated particle is one unit of mass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from ..intervals import Interval
+from ..kernels.base import Kernel
+from ..kernels.majorant import Majorant
+from .base import Weighting
+from .weight_function import power, power_factor, power_interval, power_majorant
+
+
+@dataclass(frozen=True)
+class MassFlow(Weighting):
+    """Every simulated particle stands for one unit of mass, the share ``1/l`` of a particle.
+
+    When i and j aggregate, one of the two is taken out, i with probability ``i / (i + j)``, and
+    ``i + j`` is put in. The number of simulated particles stays, mass is conserved exactly, and
+    large particles, which hold most of the mass, are many. The weight ``w(l) = l``.
+
+    References
+    ----------
+    H. Babovsky, Monte Carlo Methods Appl. 5, 1 (1999), doi:10.1515/mcma.1999.5.1.1; A. Eibeck and
+    W. Wagner, Ann. Appl. Probab. 11, 1137 (2001), doi:10.1214/aoap/1015345398.
+    """
+
+    name: ClassVar[str] = "mass-flow"
+    cheap: ClassVar[bool] = True
+
+    @property
+    def weight(self) -> Callable[..., Any]:
+        """See `Weighting.weight`."""
+        return power
+
+    @property
+    def factor(self) -> Callable[..., Any]:
+        """See `Weighting.factor`."""
+        return power_factor
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """See `Weighting.parameters`: those of `WeightFunction` with the power one."""
+        return (1.0,)
+
+    def interval(self, i: Interval, j: Interval) -> Interval:
+        """See `Weighting.interval`."""
+        return power_interval(i, j, 1.0)
+
+    def majorant(self, kernel: Kernel) -> Majorant | None:
+        """See `Weighting.majorant`; as near to the simulated rate as that of the kernel is."""
+        return power_majorant(kernel.majorant(), 1.0)
