@@ -34,6 +34,12 @@ def _loop(dimension: int) -> Callable[..., Any]:
     return windows.bind(dimension)
 
 
+def _rows(count: int, **columns: tuple[str, int]) -> NDArray[Any]:
+    """Return a table of rows, all columns of one beside each other."""
+    kinds = [(name, kind, (width,)) for name, (kind, width) in columns.items()]
+    return np.zeros(count, np.dtype(kinds, align=True))
+
+
 @dataclass
 class _State:
     """What survives when discs are put into blocks anew: clusters as arrays by cluster."""
@@ -113,28 +119,38 @@ class WindowedRun(Run):
         return self._gridded(f)
 
     def _empty(self, n: int, blocks: int, clusters: int) -> Any:
-        flight, d, small = self._flight, self.system.dimension, np.int32
+        flight, d = self._flight, self.system.dimension
         pairs, events = self._room
+        # what is read together lies together
+        disc = _rows(n, rel=("f8", d), disc=("i4", 2))
+        block = _rows(
+            blocks + 1, place=("f8", d), half=("f4", d), block=("i4", flight.BLOCK_COLUMNS)
+        )
+        cluster = _rows(
+            clusters,
+            body=("f8", 2 * d + flight.BODY), bound=("f8", 2 * d), group=("i4", flight.GROUP_COLUMNS),
+        )  # fmt: skip
+        event = _rows(events, when=("f8", 1), event=("i4", 2))
         return flight.Flight(
             clock=self.clock,
             count=self.count,
             length=np.array(self.system.box.lengths),
             period=self.system.box.periods,
             cells=np.ones(d, np.int64),
-            rel=np.empty((n, d)),
+            scale=np.ones(d),
+            rel=disc["rel"],
             radius=np.full(n if self.count[flight.SPREAD] else 1, self.system.radius[0]),
-            disc=np.empty((n, 2), small),
-            block=np.zeros((blocks + 1, flight.BLOCK_COLUMNS), small),
-            place=np.empty((blocks, d)),
-            half=np.empty((blocks, d), np.float32),
-            head=np.empty(0, small),
-            body=np.zeros((clusters, 2 * d + flight.BODY)),
-            bound=np.empty((clusters, 2 * d)),
-            group=np.zeros((clusters, flight.GROUP_COLUMNS), small),
-            pair=np.zeros((pairs, 3), small),
-            link=np.empty((2 * pairs, 2), small),
-            when=np.empty(events),
-            event=np.empty((events, 2), small),
+            disc=disc["disc"],
+            block=block["block"],
+            place=block["place"][:blocks],
+            half=block["half"][:blocks],
+            head=np.empty(0, np.int32),
+            body=cluster["body"],
+            bound=cluster["bound"],
+            group=cluster["group"],
+            half_edge=np.zeros((2 * pairs, flight.EDGE_COLUMNS), np.int32),
+            when=event["when"][:, 0],
+            event=event["event"],
         )
 
     def _gridded(self, f: Any) -> Any:
@@ -147,13 +163,15 @@ class WindowedRun(Run):
         self.clock[flight.BUDGET_OF_WAY] = skin / 2 * (1 - 1e-6)
         self.clock[flight.WINDOW] = -1.0
         self.count[flight.FULL] = 0
+        self.count[flight.PACKED] = self.count[flight.WINDOWS]
         for mark, of in (
             (flight.MARK_LISTED, flight.LISTED),
             (flight.MARK_CHECKED, flight.CHECKED),
             (flight.MARK_PREDICTED, flight.PREDICTED),
         ):
             self.count[mark] = self.count[of]
-        return f._replace(cells=cells, head=np.full(int(np.prod(cells)), -1, np.int32))
+        scale = cells / np.array(self.system.box.lengths)
+        return f._replace(cells=cells, scale=scale, head=np.full(int(np.prod(cells)), -1, np.int32))
 
     def _repack(self) -> None:
         f, flight, d = self.flight, self._flight, self.system.dimension

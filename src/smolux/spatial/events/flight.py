@@ -41,7 +41,8 @@ RELABELLED = 13  # blocks that changed their cluster
 MARK_LISTED = 14  # the same when the skin was last judged
 MARK_CHECKED = 15
 MARK_PREDICTED = 16
-COUNTS = 17
+PACKED = 17  # window before which discs were put into the order of space
+COUNTS = 18
 
 # Columns of Flight.body after displacement and velocity, which take 2 d.
 SINCE = 0  # time of the displacement
@@ -60,7 +61,7 @@ AT_REST = 2
 LONELY = 3
 NO_PAIRS = 4  # no room for pairs
 NO_EVENTS = 5  # no room for events
-RESKIN = 6  # another skin would be better: clock[SKIN] holds it
+RESKIN = 6  # blocks are to be made anew, for the skin of the clock
 
 
 # Columns of Flight.disc.
@@ -71,15 +72,18 @@ FIRST, CLUSTER, CHAIN, CELL, NEXT = 0, 1, 2, 3, 4
 BLOCK_COLUMNS = 5
 
 # Columns of Flight.group: first and last block, number of blocks and of discs, first and last
-# half-edge, number of the latest state, and of the batch: 2 n to be listed in batch n, 2 n + 1 done.
+# half-edge, number of the latest state, and of the listing: 2 n to be listed in batch n, 2 n + 1 if
+# that is done.
 START, END, BLOCKS, DISCS, EDGE, LAST_EDGE, STAMP, LISTED_IN = 0, 1, 2, 3, 4, 5, 6, 7
 GROUP_COLUMNS = 8
 
-# Columns of Flight.pair, Flight.link and Flight.event. Half-edge 2 p is that of ONE of pair p,
-# 2 p + 1 that of TWO. An event is that of a pair, or -1 - the number of a cluster; it is out of
+# Columns of Flight.half_edge: those before and after it in the list of a cluster, its disc. Pair p
+# is that of half-edges 2 p and 2 p + 1; the first one has the number of its latest prediction.
+BEFORE, AFTER, DISC, VERSION = 0, 1, 2, 3
+EDGE_COLUMNS = 4
+
+# Columns of Flight.event. An event is that of a pair, or -1 - the number of a cluster; it is out of
 # date unless WHICH is the version of the pair or the state of the cluster.
-ONE, TWO, VERSION = 0, 1, 2
-BEFORE, AFTER = 0, 1
 WHAT, WHICH = 0, 1
 
 
@@ -89,8 +93,8 @@ class Flight(NamedTuple):
     Attributes
     ----------
     clock, count : of shape (CLOCKS,), (COUNTS,)
-    length, period, cells : of shape (d,)
-        The box, and the number of cells along each axis.
+    length, period, cells, scale : of shape (d,)
+        The box, and the number of cells along each axis and in a unit of length.
     rel, radius, disc : of shape (N, d), (N,) or (1,), (N, 2)
         Discs, in the order of space.
     block, place, half : of shape (B + 1, 5), (B, d), (B, d)
@@ -99,7 +103,7 @@ class Flight(NamedTuple):
         First block of each cell.
     body, bound, group : of shape (G, 2 d + 4), (G, 2 d), (G, 8)
         Clusters; their lower and upper bounds, less the displacement.
-    pair, link : of shape (P, 3), (2 P, 2)
+    half_edge : of shape (2 P, 4)
     when, event : of shape (E,), (E, 2)
         The heap.
     """
@@ -109,6 +113,7 @@ class Flight(NamedTuple):
     length: np.ndarray
     period: np.ndarray
     cells: np.ndarray
+    scale: np.ndarray
     rel: np.ndarray
     radius: np.ndarray
     disc: np.ndarray
@@ -119,7 +124,6 @@ class Flight(NamedTuple):
     body: np.ndarray
     bound: np.ndarray
     group: np.ndarray
-    pair: np.ndarray
-    link: np.ndarray
+    half_edge: np.ndarray
     when: np.ndarray
     event: np.ndarray

@@ -6,13 +6,12 @@ import numpy as np
 
 from ...core.compile import cold_piece, piece
 from .flight import (
+    DISC,
     EVENT,
     FULL,
     HEAP,
     NAME,
-    ONE,
     STAMP,
-    TWO,
     VERSION,
     WHAT,
     WHICH,
@@ -23,11 +22,11 @@ from .geometry import larger, smaller
 @cold_piece
 def earlier_of_equals(f, a, b):
     """Which of two events at one time comes first: contacts by their discs, then reflections."""
-    disc, pair = f.disc, f.pair
+    disc, half_edge = f.disc, f.half_edge
     if a < 0 or b < 0:
         return a > b
-    i, j = disc[pair[a, ONE], NAME], disc[pair[a, TWO], NAME]
-    k, m = disc[pair[b, ONE], NAME], disc[pair[b, TWO], NAME]
+    i, j = disc[half_edge[2 * a, DISC], NAME], disc[half_edge[2 * a + 1, DISC], NAME]
+    k, m = disc[half_edge[2 * b, DISC], NAME], disc[half_edge[2 * b + 1, DISC], NAME]
     low, other = smaller(i, j), smaller(k, m)
     return low < other or (low == other and larger(i, j) < larger(k, m))
 
@@ -65,7 +64,9 @@ def sift_down(f, k, n, t, what, which):
 @piece
 def is_current(f, what, which):
     """Whether nothing has changed since an event was predicted."""
-    return f.pair[what, VERSION] == which if what >= 0 else f.group[-1 - what, STAMP] == which
+    return (
+        f.half_edge[2 * what, VERSION] == which if what >= 0 else f.group[-1 - what, STAMP] == which
+    )
 
 
 @cold_piece

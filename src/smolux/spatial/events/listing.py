@@ -63,14 +63,20 @@ def bind(d):
         body[c, 2 * d + SINCE] = t
 
     @piece
+    def cell_along(f, x, k):
+        """Cell of a coordinate along an axis."""
+        length, n = f.length[k], f.cells[k]
+        if f.period[k] > 0.0:
+            x -= length * math.floor(x / length)
+        c = np.int64(x * f.scale[k])
+        return c if 0 <= c < n else (np.int64(0) if c < 0 else n - 1)
+
+    @piece
     def cell_at(f, b, t):
         """Cell that holds the centre of a block."""
         cell = np.int64(0)
         for k in range(d):
-            x, length, n = centre(f, b, k, t), f.length[k], f.cells[k]
-            if f.period[k] > 0.0:
-                x -= length * math.floor(x / length)
-            cell = cell * n + smaller(larger(np.int64(x / length * n), 0), n - 1)
+            cell = cell * f.cells[k] + cell_along(f, centre(f, b, k, t), k)
         return cell
 
     @piece
@@ -131,56 +137,63 @@ def bind(d):
             list_discs(f, b, q, dx)
 
     @piece
-    def around(f, b, axis, near):
-        """Write the places along an axis of the cells around that of a block; return how many.
+    def around(f, x, k, near):
+        """Write the places of the three cells around a coordinate along an axis; -1 if there is none.
 
         Along a periodic axis of one or two cells, neighbours on both sides are the same cell.
         """
-        cells = f.cells
-        rest, stride = f.block[b, CELL], 1
-        for m in range(d - 1, axis, -1):
-            rest //= cells[m]
-            stride *= cells[m]
-        n = cells[axis]
-        at = rest % n
-        count = 0
-        for step in range(-1, 2):
-            to = at + step
-            if f.period[axis] > 0.0:
-                if (n == 1 and step != 0) or (n == 2 and step < 0):
-                    continue
-                to = to + n if to < 0 else to - n if to >= n else to
-            elif to < 0 or to >= n:
-                continue
-            near[axis, count] = to * stride
-            count += 1
-        return count
+        n, stride = f.cells[k], 1
+        for m in range(k + 1, d):
+            stride *= f.cells[m]
+        at = cell_along(f, x, k)
+        wraps = f.period[k] > 0.0
+        near[k, 1] = at * stride
+        below, above = at - 1, at + 1
+        if wraps:
+            below = below if below >= 0 else n - 1 if n > 2 else -1
+            above = above if above < n else 0 if n > 1 else -1
+            if n == 2:  # the other cell once
+                below, above = -1, 1 - at
+        elif above == n:
+            above = -1
+        near[k, 0] = below * stride if below >= 0 else -1
+        near[k, 2] = above * stride if above >= 0 else -1
 
     @piece
-    def search(f, b, t, batch, work, near):
-        """List pairs of a block with those of other clusters, except of those listed in a batch."""
+    def search(f, b, t, batch, forward, work, near):
+        """List pairs of a block with those of other clusters, except of those listed in a batch.
+
+        If all blocks are listed, each pair is looked at from one side: `forward`, or by numbers.
+        """
         block = f.block
         x, dx = work[0], work[1]
         own = block[b, CLUSTER]
         reach = f.clock[WIDEST] + f.clock[SKIN]
         still = batch == 0
         for k in range(d):
-            x[k] = centre(f, b, k, t)
-        rows = around(f, b, np.int64(0), near)
-        columns = around(f, b, np.int64(1), near)
-        layers = around(f, b, np.int64(2), near) if d == 3 else 1
+            x[k] = f.place[b, k] if still else centre(f, b, k, t)
+            around(f, x[k], k, near)
         checked = 0
-        for one in range(rows):
-            for two in range(columns):
-                for three in range(layers):
-                    cell = near[0, one] + near[1, two]
+        for one in range(1 if forward else 0, 3):
+            for two in range(1 if forward and one == 1 else 0, 3):
+                row = near[0, one] + near[1, two]
+                if near[0, one] < 0 or near[1, two] < 0:
+                    continue
+                middle = one == 1 and two == 1
+                for three in range(0 if d == 3 and not (forward and middle) else 1, d):
+                    cell = row
                     if d == 3:
+                        if near[2, three] < 0:
+                            continue
                         cell += near[2, three]
                     q = np.int64(f.head[cell])
+                    if forward and middle and (d == 2 or three == 1):
+                        q = np.int64(block[b, NEXT])
                     while q >= 0:
                         c = block[q, CLUSTER]
-                        # of all blocks that are listed, each pair once
-                        if c != own and (q > b if still else f.group[c, LISTED_IN] != batch):
+                        if c != own and (
+                            forward or (q > b if still else f.group[c, LISTED_IN] != batch)
+                        ):
                             checked += 1
                             look(f, b, q, t, still, x, dx, reach)
                         q = np.int64(block[q, NEXT])
@@ -210,13 +223,16 @@ def bind(d):
         `batch` zero all blocks, one after the other, else those of clusters to be listed in it.
         """
         group = f.group
+        forward = batch == 0
+        for k in range(d):
+            forward = forward and f.cells[k] > 2
         for c in range(larger(groups, 1)):
             if groups > 0:
                 if batch > 0 and group[c, LISTED_IN] != batch - 1:
                     continue
                 b = np.int64(group[c, START])
             while b != stop:
-                search(f, b, t, batch, work, near)
+                search(f, b, t, batch, forward, work, near)
                 b = b + 1 if batch == 0 else np.int64(f.block[b, CHAIN])
             if groups > 0:
                 group[c, LISTED_IN] = batch

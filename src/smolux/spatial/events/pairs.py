@@ -8,14 +8,13 @@ from .flight import (
     BEFORE,
     BLOCK,
     CLUSTER,
+    DISC,
     EDGE,
     FREE,
     FULL,
     LAST_EDGE,
-    ONE,
     PAIR,
     PAIRS,
-    TWO,
     USED,
     VERSION,
 )
@@ -30,12 +29,12 @@ def cluster_of(f, i):
 @piece
 def link(f, h, c):
     """Put a half-edge into the list of a cluster."""
-    group, link = f.group, f.link
+    group, half_edge = f.group, f.half_edge
     top = group[c, EDGE]
-    link[h, BEFORE] = -1
-    link[h, AFTER] = top
+    half_edge[h, BEFORE] = -1
+    half_edge[h, AFTER] = top
     if top >= 0:
-        link[top, BEFORE] = h
+        half_edge[top, BEFORE] = h
     else:
         group[c, LAST_EDGE] = h
     group[c, EDGE] = h
@@ -44,14 +43,14 @@ def link(f, h, c):
 @piece
 def unlink(f, h, c):
     """Take a half-edge out of the list of a cluster."""
-    link, group = f.link, f.group
-    before, after = link[h, BEFORE], link[h, AFTER]
+    half_edge, group = f.half_edge, f.group
+    before, after = half_edge[h, BEFORE], half_edge[h, AFTER]
     if before >= 0:
-        link[before, AFTER] = after
+        half_edge[before, AFTER] = after
     else:
         group[c, EDGE] = after
     if after >= 0:
-        link[after, BEFORE] = before
+        half_edge[after, BEFORE] = before
     else:
         group[c, LAST_EDGE] = before
 
@@ -59,17 +58,17 @@ def unlink(f, h, c):
 @piece
 def add(f, i, j, a, b):
     """List a pair of discs of two clusters."""
-    pair, count = f.pair, f.count
+    half_edge, count = f.half_edge, f.count
     p = count[FREE]
     if p >= 0:
-        count[FREE] = f.link[2 * p, AFTER]
-    elif count[USED] < pair.shape[0]:
+        count[FREE] = f.half_edge[2 * p, AFTER]
+    elif 2 * count[USED] + 1 < half_edge.shape[0]:
         p = count[USED]
         count[USED] = p + 1
     else:
         count[FULL] = PAIR
         return
-    pair[p, ONE], pair[p, TWO] = i, j
+    half_edge[2 * p, DISC], half_edge[2 * p + 1, DISC] = i, j
     link(f, 2 * p, a)
     link(f, 2 * p + 1, b)
     count[PAIRS] += 1
@@ -81,8 +80,8 @@ def remove(f, p, a, b):
     count = f.count
     unlink(f, 2 * p, a)
     unlink(f, 2 * p + 1, b)
-    f.pair[p, VERSION] += 1
-    f.link[2 * p, AFTER] = count[FREE]
+    f.half_edge[2 * p, VERSION] += 1
+    f.half_edge[2 * p, AFTER] = count[FREE]
     count[FREE] = p
     count[PAIRS] -= 1
 
@@ -90,28 +89,30 @@ def remove(f, p, a, b):
 @piece
 def remove_all(f, c):
     """Strike all pairs of a cluster off."""
-    link, pair = f.link, f.pair
+    half_edge = f.half_edge
     h = f.group[c, EDGE]
     while h >= 0:
         p = h >> 1
-        after = link[h, AFTER]
+        after = half_edge[h, AFTER]
         if after == h ^ 1:  # a pair inside the cluster
-            after = link[after, AFTER]
-        remove(f, p, cluster_of(f, pair[p, ONE]), cluster_of(f, pair[p, TWO]))
+            after = half_edge[after, AFTER]
+        remove(
+            f, p, cluster_of(f, half_edge[2 * p, DISC]), cluster_of(f, half_edge[2 * p + 1, DISC])
+        )
         h = after
 
 
 @piece
 def splice(f, a, b):
     """Give all pairs of cluster `b` to cluster `a`."""
-    group, link = f.group, f.link
+    group, half_edge = f.group, f.half_edge
     if group[b, EDGE] < 0:
         return
     if group[a, EDGE] < 0:
         group[a, EDGE], group[a, LAST_EDGE] = group[b, EDGE], group[b, LAST_EDGE]
     else:
         top = group[a, EDGE]
-        link[group[b, LAST_EDGE], AFTER] = top
-        link[top, BEFORE] = group[b, LAST_EDGE]
+        half_edge[group[b, LAST_EDGE], AFTER] = top
+        half_edge[top, BEFORE] = group[b, LAST_EDGE]
         group[a, EDGE] = group[b, EDGE]
     group[b, EDGE] = group[b, LAST_EDGE] = -1

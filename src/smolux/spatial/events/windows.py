@@ -24,6 +24,7 @@ from .flight import (
     CHECKED,
     CLUSTER,
     CLUSTERS,
+    DISC,
     DISCS,
     DONE,
     EDGE,
@@ -45,7 +46,7 @@ from .flight import (
     NAME,
     NO_EVENTS,
     NO_PAIRS,
-    ONE,
+    PACKED,
     PAIR,
     PREDICTED,
     REBUILT,
@@ -59,7 +60,6 @@ from .flight import (
     START,
     THICKEST,
     TIME,
-    TWO,
     VERSION,
     WAY,
     WHAT,
@@ -76,7 +76,9 @@ REST = 1e-13
 #: blocks that are listed between two returns
 SLICE = 500_000
 #: all blocks are listed, which is cheaper for each, if more than this share is due
-MOST = 0.5
+MOST = 0.35
+#: windows after which discs are no longer in the order of space
+FRESH = 8
 #: a step of the skin, and how far its costs may be from balance
 STEP, TOO_SMALL, TOO_LARGE = 1.5, 2.0, 0.3
 #: costs of a listing, of a look at a pair and of a prediction, in arbitrary units
@@ -98,8 +100,8 @@ def bind(d):
     @piece
     def predict(f, p, t):
         """Predict the contact of a pair, and remember it if nothing is known to come before."""
-        pair, disc, block, radius, body, rel, place = (
-            f.pair,
+        half_edge, disc, block, radius, body, rel, place = (
+            f.half_edge,
             f.disc,
             f.block,
             f.radius,
@@ -107,7 +109,7 @@ def bind(d):
             f.rel,
             f.place,
         )
-        i, j = pair[p, ONE], pair[p, TWO]
+        i, j = half_edge[2 * p, DISC], half_edge[2 * p + 1, DISC]
         g, h = disc[i, BLOCK], disc[j, BLOCK]
         m, n = block[g, CLUSTER], block[h, CLUSTER]
         spread = f.count[SPREAD]
@@ -124,10 +126,10 @@ def bind(d):
             b += x * w
             c += x * x
         f.count[PREDICTED] += 1
-        pair[p, VERSION] += 1
+        half_edge[2 * p, VERSION] += 1
         touch = t + contact_time(a, b, c)
         if touch <= smaller(body[m, horizon], body[n, horizon]):
-            push(f, touch, p, pair[p, VERSION])
+            push(f, touch, p, half_edge[2 * p, VERSION])
 
     @piece
     def next_wall(f, c):
@@ -170,19 +172,21 @@ def bind(d):
         Of clusters as in `look_ahead`. If these are `every` cluster, each pair is met twice, and
         predicted once.
         """
-        group, link, pair = f.group, f.link, f.pair
+        group, half_edge = f.group, f.half_edge
         while c < stop:
             h = np.int64(-1)
             if batch == 0 or group[c, LISTED_IN] == batch:
                 h = np.int64(group[c, EDGE])
             while h >= 0:
-                p, after = h >> 1, np.int64(link[h, AFTER])
+                p, after = h >> 1, np.int64(half_edge[h, AFTER])
                 if every > 0:
                     if h & 1 == 0:
                         predict(f, p, t)
-                elif cluster_of(f, pair[p, ONE]) == cluster_of(f, pair[p, TWO]):
+                elif cluster_of(f, half_edge[2 * p, DISC]) == cluster_of(
+                    f, half_edge[2 * p + 1, DISC]
+                ):
                     if after == h ^ 1:
-                        after = np.int64(link[after, AFTER])
+                        after = np.int64(half_edge[after, AFTER])
                     remove(f, p, np.int32(c), np.int32(c))
                 else:
                     predict(f, p, t)
@@ -289,6 +293,8 @@ def bind(d):
                     group[c, LISTED_IN] = 2 * count[BATCH]
                     due += group[c, BLOCKS]
         clock[WINDOW] = t + length
+        if due > MOST * f.place.shape[0] and f.count[WINDOWS] - f.count[PACKED] > FRESH:
+            return RESKIN  # all are listed anyway: bring them into the order of space before
         if due > MOST * f.place.shape[0]:
             relist_all(f, work, near)
         elif due > 0:
@@ -344,8 +350,8 @@ def bind(d):
     @piece
     def merge(f, p, t, work, near):
         """Make one cluster of two; return their discs in contact."""
-        body, disc, group, pair, block = f.body, f.disc, f.group, f.pair, f.block
-        i, j = np.int64(pair[p, ONE]), np.int64(pair[p, TWO])
+        body, disc, group, half_edge, block = f.body, f.disc, f.group, f.half_edge, f.block
+        i, j = np.int64(half_edge[2 * p, DISC]), np.int64(half_edge[2 * p + 1, DISC])
         if disc[j, NAME] < disc[i, NAME]:
             i, j = j, i
         first, second = disc[i, NAME], disc[j, NAME]
