@@ -13,6 +13,7 @@ _LAZY = {
     "Cells": "direct",
     "SpatialProgress": "running",
     "System": "system",
+    "Windowed": "windowed",
     "bimodal_radii": "initial",
     "lattice": "initial",
     "log_of": "result",
@@ -28,7 +29,9 @@ __all__ = [
     "AllPairs",
     "Box",
     "Cells",
+    "SpatialProgress",
     "System",
+    "Windowed",
     "bimodal_radii",
     "lattice",
     "log_of",
@@ -45,8 +48,9 @@ if TYPE_CHECKING:
     from .initial import bimodal_radii, lattice, lognormal_radii, random
     from .methods import METHODS
     from .result import log_of, replay, system_of
-    from .running import simulate
+    from .running import SpatialProgress, simulate
     from .system import System
+    from .windowed import Windowed
 
 
 def __getattr__(name: str) -> Any:

@@ -159,31 +159,33 @@ class _Driver:
     def drive(self, until: float, most: float, limit: float) -> str:
         """Go on to the end; return why it was not the goal, or nothing."""
         told = self.started
-        while True:
-            budget = int(min(_BUDGET, most - self.run.events))
-            if budget <= 0:
-                return f"the limit of {most:g} events is reached"
-            code = self.run.advance(until, self.target, budget)
+        while (code := self._slice(until, most, limit)) is None:
             now = clock.perf_counter()
-            if not self.compile_seconds:
-                self.compile_seconds = now - self.started
-            if code is not None:
-                self._tell(now)
-                return code
-            if now - self.started > limit:
-                return f"the time limit of {limit:g} s is reached"
             if now - told > _TICK:
                 told = now
-                self._tell(now)
+                self._tell()
+        self._tell()
+        return code
 
-    def _tell(self, now: float) -> None:
+    def _slice(self, until: float, most: float, limit: float) -> str | None:
+        budget = int(min(_BUDGET, most - self.run.events))
+        if budget <= 0:
+            return f"the limit of {most:g} events is reached"
+        code = self.run.advance(until, self.target, budget)
+        spent = clock.perf_counter() - self.started
+        self.compile_seconds = self.compile_seconds or spent
+        if code is None and spent > limit:
+            return f"the time limit of {limit:g} s is reached"
+        return code
+
+    def _tell(self) -> None:
         if self.progress is None:
             return
         run, wanted = self.run, max(self.discs - self.target, 1)
         done = min((self.discs - run.clusters) / wanted, 1.0)
         self.progress(
             SpatialProgress(
-                run.events, run.clusters, run.time, done, run.events / (now - self.started),
+                run.events, run.clusters, run.time, done, run.events / (clock.perf_counter() - self.started),
                 np.nan, self.compile_seconds,
             )
         )  # fmt: skip

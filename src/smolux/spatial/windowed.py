@@ -19,7 +19,7 @@ from .trace import Trace
 Float = NDArray[np.float64]
 
 _ROOM = 1 << 16
-#: the skin at the start in mean distances of discs, and its least in diameters: below it room is made
+#: the skin at the start in mean distances of discs; its least, in diameters: then room is made
 _SKIN, _THIN = 0.6, 1e-3
 #: room for pairs and for events at the start, by disc
 _PAIRS, _EVENTS = 2.5, 3.0
@@ -128,8 +128,10 @@ class WindowedRun(Run):
         )
         cluster = _rows(
             clusters,
-            body=("f8", 2 * d + flight.BODY), bound=("f8", 2 * d), group=("i4", flight.GROUP_COLUMNS),
-        )  # fmt: skip
+            body=("f8", 2 * d + flight.BODY),
+            bound=("f8", 2 * d),
+            group=("i4", flight.GROUP_COLUMNS),
+        )
         event = _rows(events, when=("f8", 1), event=("i4", 2))
         return flight.Flight(
             clock=self.clock,
@@ -243,9 +245,13 @@ class WindowedRun(Run):
         label = np.empty(len(x), np.int32)
         label[name] = least[own]
         counters = {
-            "windows": "WINDOWS", "listings_of_blocks": "LISTED", "distances": "CHECKED",
-            "predictions": "PREDICTED", "relabelled_blocks": "RELABELLED", "full_listings": "REBUILT",
-        }  # fmt: skip
+            "windows": "WINDOWS",
+            "listings_of_blocks": "LISTED",
+            "distances": "CHECKED",
+            "predictions": "PREDICTED",
+            "relabelled_blocks": "RELABELLED",
+            "full_listings": "REBUILT",
+        }
         attributes = {key: int(self.count[getattr(flight, c)]) for key, c in counters.items()}
         return Trace(self.time, x, v, label, self.logger.log(), attributes=attributes)
 

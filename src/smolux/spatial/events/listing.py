@@ -34,7 +34,7 @@ from .flight import (
     WAY,
     WIDEST,
 )
-from .geometry import larger, shift, smaller
+from .geometry import larger, shift
 from .pairs import add
 
 
@@ -138,7 +138,7 @@ def bind(d):
 
     @piece
     def around(f, x, k, near):
-        """Write the places of the three cells around a coordinate along an axis; -1 if there is none.
+        """Write the places of the cells around a coordinate along an axis; -1 if there is none.
 
         Along a periodic axis of one or two cells, neighbours on both sides are the same cell.
         """

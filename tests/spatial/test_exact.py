@@ -1,0 +1,56 @@
+"""The three methods make the same merges, in the same order, at the same times."""
+
+from __future__ import annotations
+
+import numpy as np
+import plain_numpy
+import pytest
+from flights import assert_same, merges, run, system
+
+import smolux.spatial as sp
+
+
+@pytest.mark.parametrize("number", range(100))
+def test_windowed_is_all_pairs_is_cells(number):
+    s = system(number, most=200 if number < 6 else 60)
+    pairs = run(s, "all-pairs")
+    assert pairs.stopped == ""
+    assert len(merges(pairs)) == len(s) - 1  # a tree
+    assert_same(run(s, "windowed"), pairs)
+    assert_same(run(s, "cells"), pairs)
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_in_space_against_plain_numpy(number):
+    s = system(number, dimension=3, most=24)
+    expected = plain_numpy.merges(s)
+    for method in ("windowed", "cells"):
+        trace = run(s, method)
+        np.testing.assert_array_equal(merges(trace), [[i, j] for _, i, j in expected])
+        times = trace.log.time[trace.log.merges]
+        np.testing.assert_allclose(times, [t for t, _, _ in expected], rtol=1e-9)
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_all_pairs_against_plain_numpy(number):
+    s = system(number, most=20)
+    expected = plain_numpy.merges(s)
+    np.testing.assert_array_equal(merges(run(s, "all-pairs")), [[i, j] for _, i, j in expected])
+
+
+@pytest.mark.parametrize("skin", [1e-3, 0.05, 3.0])
+def test_the_skin_changes_the_cost_only(skin):
+    s = sp.lattice(225, 0.3, seed=5, walls=("periodic", "reflecting"))
+    assert_same(run(s, sp.Windowed(skin=skin)), run(s, "windowed"))
+
+
+def test_stopping_and_going_on_changes_nothing():
+    s = sp.lattice(144, 0.2, seed=8)
+    whole, parts = run(s, "windowed"), sp.Windowed().start(s, np.empty(0))
+    for until in (0.3, 0.31, 1.0, 4.0):
+        while parts.advance(until, 1, 3) is None:
+            assert parts.time <= until
+        assert parts.time == until
+    while parts.advance(np.inf, 1, 1) is None:
+        pass
+    assert_same(parts.trace(), whole)
