@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from .model import Model
 from .model_dict import model_from_dict, model_to_dict
 from .plan import Plan
 from .replicas import Group
+from .subvolumes import Divided
 from .weighting import WEIGHTINGS, Weighting
 
 #: what reading a file that is no checkpoint, or half of one, may raise
@@ -57,6 +58,8 @@ def _plan_to_dict(plan: Plan) -> dict[str, Any]:
         "bins_per_octave": plan.bins_per_octave,
         "distribution": plan.distribution,
         "goal": None if plan.goal is None else asdict(plan.goal),
+        "subvolumes": plan.subvolumes,
+        "remix": plan.remix,
     }
 
 
@@ -85,34 +88,41 @@ def _plan_from_dict(given: dict[str, Any], model: Model | None) -> Plan:
     )
 
 
-def save(path: str | Path, plan: Plan, groups: Sequence[Group]) -> None:
+def save(path: str | Path, plan: Plan, groups: Sequence[Group | Divided]) -> None:
     """Write a checkpoint, whole or not at all; see `smolux.files.replacing`."""
     arrays: dict[str, np.ndarray] = {}
-    about = []
-    for k, group in enumerate(groups):
-        for kind, values in (("state", group.state), ("work", group.work), ("tally", group.tally)):
-            arrays |= {f"{k}/{kind}/{name}": v for name, v in values._asdict().items()}
-        arrays[f"{k}/codes"] = group.codes
-        arrays |= {f"{k}/windows/{name}": v for name, v in group.windows._asdict().items()}
-        rows = [row for replica in group.distribution for row in replica]
-        empty = [np.empty(0, np.int64)]
-        arrays[f"{k}/distribution/rows"] = np.array([len(s) for s, _ in rows], np.int64)
-        arrays[f"{k}/distribution/sizes"] = np.concatenate([s for s, _ in rows] + empty)
-        arrays[f"{k}/distribution/counts"] = np.concatenate([c for _, c in rows] + empty)
-        about.append(
-            {
-                "first": group.first,
-                "seconds": group.seconds,
-                "populations": [len(replica) for replica in group.distribution],
-            }
-        )
+    about = [_put(arrays, str(k), group) for k, group in enumerate(groups)]
     meta = {"version": VERSION, "plan": _plan_to_dict(plan), "groups": about}
     arrays["meta"] = np.frombuffer(json.dumps(meta).encode(), np.uint8)
     with replacing(path) as temporary, temporary.open("wb") as f:
         np.savez(f, **arrays)  # type: ignore[arg-type]
 
 
-def load(path: str | Path, model: Model | None = None) -> tuple[Plan, list[Group]]:
+def _put(arrays: dict[str, np.ndarray], key: str, group: Group | Divided) -> dict[str, Any]:
+    """Add the arrays of a group under names that begin with `key`; return the rest."""
+    kinds = {"state": group.state, "tally": group.tally, "windows": group.windows}
+    if isinstance(group, Group):
+        kinds["work"] = group.work
+    for kind, values in kinds.items():
+        arrays |= {f"{key}/{kind}/{name}": v for name, v in values._asdict().items()}
+    arrays[f"{key}/codes"] = group.codes
+    rows = [row for replica in group.distribution for row in replica]
+    empty = [np.empty(0, np.int64)]
+    arrays[f"{key}/distribution/rows"] = np.array([len(s) for s, _ in rows], np.int64)
+    arrays[f"{key}/distribution/sizes"] = np.concatenate([s for s, _ in rows] + empty)
+    arrays[f"{key}/distribution/counts"] = np.concatenate([c for _, c in rows] + empty)
+    about = {
+        "first": group.first,
+        "seconds": group.seconds,
+        "populations": [len(replica) for replica in group.distribution],
+    }
+    if isinstance(group, Divided):
+        about |= {"stretch": group.stretch, "length": group.length}
+        about["parts"] = [_put(arrays, f"{key}/{m}", part) for m, part in enumerate(group.parts)]
+    return about
+
+
+def load(path: str | Path, model: Model | None = None) -> tuple[Plan, list[Group | Divided]]:
     """Read a checkpoint.
 
     Parameters
@@ -145,7 +155,7 @@ def load(path: str | Path, model: Model | None = None) -> tuple[Plan, list[Group
         if model is not None and model_to_dict(model) != meta["plan"]["model"]:
             raise InputError(f"model: is not the one of the checkpoint {str(path)!r}")
         plan = _plan_from_dict(meta["plan"], model)
-        return plan, [_group(plan, k, about, arrays) for k, about in enumerate(meta["groups"])]
+        return plan, [_take(arrays, str(k), about, plan) for k, about in enumerate(meta["groups"])]
     except InputError:
         raise
     except _UNREADABLE as error:
@@ -157,9 +167,13 @@ def _damaged(path: str | Path, error: Exception) -> InputError:
     return InputError(f"checkpoint = {str(path)!r}: is none, or damaged ({reason})")
 
 
-def _group(plan: Plan, k: int, about: dict[str, Any], arrays: dict[str, np.ndarray]) -> Group:
+def _take(
+    arrays: dict[str, np.ndarray], key: str, about: dict[str, Any], plan: Plan
+) -> Group | Divided:
+    """Make a group of what `_put` has added."""
+
     def part(kind: str) -> dict[str, np.ndarray]:
-        start = f"{k}/{kind}/"
+        start = f"{key}/{kind}/"
         return {n.removeprefix(start): v for n, v in arrays.items() if n.startswith(start)}
 
     stored = part("distribution")
@@ -169,14 +183,19 @@ def _group(plan: Plan, k: int, about: dict[str, Any], arrays: dict[str, np.ndarr
     for length in about["populations"]:
         distribution.append(rows[:length])
         rows = rows[length:]
-    return Group(
-        plan,
-        about["first"],
-        State(**part("state")),
-        plan.method.work_type(**part("work")),
-        Tally(**part("tally")),
-        arrays[f"{k}/codes"],
-        Windows(**part("windows")),
-        distribution=distribution,
-        seconds=about["seconds"],
-    )
+    common: dict[str, Any] = {
+        "first": about["first"],
+        "state": State(**part("state")),
+        "tally": Tally(**part("tally")),
+        "codes": arrays[f"{key}/codes"],
+        "windows": Windows(**part("windows")),
+        "distribution": distribution,
+        "seconds": about["seconds"],
+    }
+    if "parts" not in about:
+        return Group(plan, work=plan.method.work_type(**part("work")), **common)
+    alone = replace(plan, subvolumes=1, replicas=1)
+    parts: list[Any] = [
+        _take(arrays, f"{key}/{m}", each, alone) for m, each in enumerate(about["parts"])
+    ]
+    return Divided(plan, stretch=about["stretch"], length=about["length"], parts=parts, **common)

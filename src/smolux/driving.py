@@ -20,6 +20,7 @@ from .observe import observable, to_records
 from .plan import Plan, check_memory
 from .replicas import Group
 from .results import to_dataset
+from .subvolumes import Divided, start
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,7 +67,7 @@ class Run:
     def __init__(
         self,
         plan: Plan,
-        groups: list[Group],
+        groups: list[Group | Divided],
         progress: Callable[[Progress], None] | None,
         workers: int,
     ) -> None:
@@ -139,7 +140,7 @@ class Threads(Run):
     def __init__(
         self,
         plan: Plan,
-        groups: list[Group],
+        groups: list[Group | Divided],
         executor: ThreadPoolExecutor | None,
         progress: Callable[[Progress], None] | None,
         checkpoint: Path | None,
@@ -183,7 +184,7 @@ class Threads(Run):
                     parts = self.more()
                     if not parts:
                         return ""
-                    self.groups += [Group.start(self.plan, *part) for part in parts]
+                    self.groups += [start(self.plan, *part) for part in parts]
                 now = time.perf_counter()
                 if now - self.started > self.limit:
                     return f"stopped at the time limit of {self.limit:g} s"
@@ -235,9 +236,9 @@ class Threads(Run):
         self.saved = time.perf_counter()
 
 
-def run_group(plan: Plan, first: int, count: int) -> Group:
+def run_group(plan: Plan, first: int, count: int) -> Group | Divided:
     """Run a group to its end, in a worker of any executor."""
-    group = Group.start(plan, first, count)
+    group = start(plan, first, count)
     group.compile()
     group.advance(lambda: False)
     group.release()  # what was observed is all that goes back
@@ -275,8 +276,8 @@ class Elsewhere(Run):
             raise Interrupted("interrupted") from None
         return self.dataset()
 
-    def _gather(self, parts: list[tuple[int, int]]) -> dict[int, Group]:
-        found: dict[int, Group] = {}
+    def _gather(self, parts: list[tuple[int, int]]) -> dict[int, Group | Divided]:
+        found: dict[int, Group | Divided] = {}
         tasks = [(self.plan, *part) for part in parts]
         self._tell(found)
         for done in completed(self.executor, run_group, tasks, _TICK):
@@ -293,7 +294,7 @@ class Elsewhere(Run):
             self._tell(found)
         return found
 
-    def _tell(self, found: dict[int, Group]) -> None:
+    def _tell(self, found: dict[int, Group | Divided]) -> None:
         groups = [*self.groups, *found.values()]
         events = sum(g.events for g in groups)
         spent = time.perf_counter() - self.started

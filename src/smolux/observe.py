@@ -11,11 +11,12 @@ from .core.state import CLOCKS, DOUBLINGS, EXTINCT, FLOOR, REPAIRS, TRIALS, WORS
 from .plan import Plan
 from .records import Records
 from .replicas import Group
+from .subvolumes import Divided
 
 Float = NDArray[np.float64]
 
 
-def to_records(plan: Plan, groups: Sequence[Group]) -> Records:
+def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
     """Turn counts into densities; output times not reached are NaN.
 
     Parameters
@@ -25,7 +26,7 @@ def to_records(plan: Plan, groups: Sequence[Group]) -> Records:
         In the order of their replicas.
     """
     scalars = np.concatenate([g.tally.scalars for g in groups])
-    _, particles, collisions, volume, largest = np.moveaxis(scalars, -1, 0)
+    _, particles, collisions, volume, largest, come, gone = np.moveaxis(scalars, -1, 0)
     missing = np.isnan(volume)
     counts = np.concatenate([g.tally.counts for g in groups])[:, :, 1:]
     bins = np.concatenate([g.tally.bins for g in groups])
@@ -36,6 +37,8 @@ def to_records(plan: Plan, groups: Sequence[Group]) -> Records:
     stood = counts * weights
     sums = np.concatenate([g.tally.sums for g in groups])
     powers = sizes[:, None] ** np.array(plan.orders)
+    inside = np.where(missing, np.nan, stood @ sizes + sums[..., -1])
+    sums = sums[..., : len(plan.orders)]
     events = np.concatenate([g.tally.events for g in groups]).astype(float)
     events[missing] = np.nan
     clock = np.concatenate([g.state.clock for g in groups])
@@ -58,13 +61,14 @@ def to_records(plan: Plan, groups: Sequence[Group]) -> Records:
         distribution=[rows for g in groups for rows in g.distribution]
         if plan.distribution
         else None,
+        balance=(inside, come, gone) if plan.model.open else None,
         attributes=_attributes(plan, groups),
         warnings=_warnings(plan, groups, int(missing.any(axis=1).sum())),
     )
 
 
 def _number_density(
-    plan: Plan, groups: Sequence[Group], particles: Float, volume: Float
+    plan: Plan, groups: Sequence[Group | Divided], particles: Float, volume: Float
 ) -> Float:
     if plan.weighting.weight is None:
         return particles / volume
@@ -73,7 +77,7 @@ def _number_density(
     return np.asarray(np.concatenate(stood) / volume)
 
 
-def observable(plan: Plan, groups: Sequence[Group]) -> tuple[Float, NDArray[np.bool_]]:
+def observable(plan: Plan, groups: Sequence[Group | Divided]) -> tuple[Float, NDArray[np.bool_]]:
     """Return what the goal of a plan is about, at all output times of replicas that are done.
 
     Returns
@@ -84,7 +88,7 @@ def observable(plan: Plan, groups: Sequence[Group]) -> tuple[Float, NDArray[np.b
     """
     assert plan.goal is not None
     scalars = np.concatenate([g.tally.scalars for g in groups])
-    _, particles, collisions, volume, largest = np.moveaxis(scalars, -1, 0)
+    _, particles, collisions, volume, largest, *_ = np.moveaxis(scalars, -1, 0)
     values = _number_density(plan, groups, particles, volume)
     if plan.goal.target == "largest":
         values = largest
@@ -100,7 +104,7 @@ def observable(plan: Plan, groups: Sequence[Group]) -> tuple[Float, NDArray[np.b
     return values, (collisions > 0).any(axis=0)
 
 
-def _attributes(plan: Plan, groups: Sequence[Group]) -> dict[str, object]:
+def _attributes(plan: Plan, groups: Sequence[Group | Divided]) -> dict[str, object]:
     goal = plan.goal
     wanted = {} if goal is None else {"target": goal.target, "target_error": goal.error}
     return wanted | {
@@ -110,6 +114,7 @@ def _attributes(plan: Plan, groups: Sequence[Group]) -> dict[str, object]:
         "weighting": plan.weighting.name,
         "population": plan.population,
         "initial_particles": plan.particles,
+        "subvolumes": plan.subvolumes,
         "seed": str(plan.entropy),
         "doublings": int(max(g.state.count[:, DOUBLINGS].max() for g in groups)),
         "events": sum(g.events for g in groups),
@@ -119,7 +124,7 @@ def _attributes(plan: Plan, groups: Sequence[Group]) -> dict[str, object]:
     }
 
 
-def _warnings(plan: Plan, groups: Sequence[Group], unfinished: int) -> list[str]:
+def _warnings(plan: Plan, groups: Sequence[Group | Divided], unfinished: int) -> list[str]:
     count = np.concatenate([g.state.count for g in groups])
     clock = np.concatenate([g.state.clock for g in groups])
     found = []

@@ -12,18 +12,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .assembly import rates_for
+from .assembly import inflow, rates_for
 from .core.state import Grid
 from .errors import InputError, did_you_mean
 from .goal import Goal, make_goal, whole
 from .initial import Initial
-from .methods import METHODS
+from .methods import METHODS, SizeClass
 from .methods.auto import Auto, choose
 from .methods.base import Method
 from .model import Model
 from .population import POPULATIONS
 from .weighting import WEIGHTINGS
 from .weighting.base import Weighting
+
+#: particles that a sub-volume has at least: with less, fewer sub-volumes are used
+LEAST = 1000
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,10 @@ class Plan:
     reason: str = ""
     #: what replicas are added for; `replicas` are those planned so far
     goal: Goal | None = None
+    #: parts of each replica that are simulated side by side, and collisions for each particle
+    #: from one mixing to the next
+    subvolumes: int = 1
+    remix: float = 1.0
 
     @cached_property
     def start(self) -> Initial:
@@ -58,7 +65,15 @@ class Plan:
     @property
     def volume(self) -> float:
         """Volume simulated at the start."""
-        return self.particles / self.start.total
+        if self.start.total > 0.0:
+            return self.particles / self.start.total
+        # so many particles come in per unit of time
+        return self.particles / inflow(self.model.processes, self.weighting)
+
+    @property
+    def mass(self) -> int:
+        """What the mass of no replica exceeds at its start."""
+        return self.particles * self.start.largest
 
     @cached_property
     def grid(self) -> Grid:
@@ -66,11 +81,13 @@ class Plan:
         first = self.sizes + 1
         steps = np.arange(int((62 - np.log2(first)) * self.bins_per_octave) + 1)
         edges = np.unique([int(first * 2.0 ** (k / self.bins_per_octave)) for k in steps])
-        return Grid(np.array(self.times), edges.astype(np.int64), np.array(self.orders))
+        # the mass itself is looked at where it may change
+        orders = (*self.orders, 1.0) if self.model.open else self.orders
+        return Grid(np.array(self.times), edges.astype(np.int64), np.array(orders))
 
     def groups(self, workers: int, start: int = 0) -> list[tuple[int, int]]:
         """Split the replicas from `start` on: first and number of each group."""
-        together = max(1, 200_000 // self.particles)
+        together = max(1, 200_000 // self.particles) if self.subvolumes == 1 else 1
         each = max(1, min(together, -(-(self.replicas - start) // max(workers, 1))))
         return [(r, min(each, self.replicas - r)) for r in range(start, self.replicas, each)]
 
@@ -91,6 +108,8 @@ def make_plan(
     target_error: float | None = None,
     target: str = "number_density",
     max_replicas: int = 1000,
+    subvolumes: int = 1,
+    remix: float = 1.0,
 ) -> Plan:
     """Check the arguments of `simulate`, all at once; parameters as there.
 
@@ -122,6 +141,7 @@ def make_plan(
     )
     output = check_times(times, problems)
     powers = _orders(orders, problems)
+    parts = _subvolumes(subvolumes, remix, numbers["particles"], problems)
     goal = make_goal(
         target_error, target, max_replicas, replicas, powers, numbers["sizes"], problems
     )
@@ -135,6 +155,8 @@ def make_plan(
         orders=powers,
         distribution=bool(distribution),
         goal=goal,
+        subvolumes=parts,
+        remix=float(remix),
         **found,
         **numbers,  # type: ignore[arg-type]
     )
@@ -147,6 +169,8 @@ def make_plan(
 
 def _with_method(plan: Plan) -> Plan:
     """Let the method be chosen."""
+    if plan.subvolumes > 1:
+        return replace(plan, method=SizeClass(), reason="it mixes sub-volumes in the least time")
     initial, processes = plan.model.initial, plan.model.processes
     sizes, counts = initial.sample(min(plan.particles, 1000), 0.5)
     mass = float(sizes @ counts)
@@ -179,6 +203,22 @@ def _whole(what: str, value: Any, least: int, problems: list[str], most: float =
     limits = f"of at least {least}" if most == math.inf else f"from {least} to {most}"
     problems.append(f"{what} = {value!r}: must be a whole number {limits}")
     return least
+
+
+def _subvolumes(subvolumes: Any, remix: Any, particles: int, problems: list[str]) -> int:
+    parts = _whole("subvolumes", subvolumes, 1, problems)
+    if parts > 1 and particles < LEAST * parts:
+        problems.append(
+            f"subvolumes = {parts}: each needs {LEAST} particles or more, and particles = "
+            f"{particles}: use fewer sub-volumes, or several replicas instead"
+        )
+    number = isinstance(remix, (int, float, np.number)) and not isinstance(remix, bool)
+    if not (number and 0 < remix <= 10):
+        problems.append(
+            f"remix = {remix!r}: must be a number of collisions for each particle, above 0 and "
+            "at most 10"
+        )
+    return parts
 
 
 def _orders(orders: Any, problems: list[str]) -> tuple[float, ...]:
@@ -227,7 +267,9 @@ def check_memory(plan: Plan, done: int = 0) -> None:
     grid = plan.grid
     row = 8 * (plan.sizes + len(grid.edges) + len(grid.orders) + 8)
     observations = plan.replicas * len(plan.times) * row
-    stores = (plan.replicas - done) * plan.method.bytes_per_replica(plan.particles)
+    # sub-volumes are dealt out anew: what goes from one to the other is there besides
+    mixing = 8 * plan.particles if plan.subvolumes > 1 else 0
+    stores = (plan.replicas - done) * plan.method.bytes_per_replica(plan.particles) + mixing
     if observations + stores > 0.9 * available:
         raise InputError(
             f"the run needs about {(observations + stores) / 1e9:.1f} GB ({stores / 1e9:.1f} GB of "

@@ -38,6 +38,7 @@ from .core.state import (
     WORST_J,
     State,
     Tally,
+    Windows,
     new_state,
     new_tally,
 )
@@ -63,7 +64,7 @@ class Group:
     work: Any
     tally: Tally
     codes: Int
-    windows: Any
+    windows: Windows
     distribution: list[list[tuple[Int, Int]]] = field(default_factory=list)
     seconds: float = 0.0
     compile_seconds: float = 0.0
@@ -71,25 +72,27 @@ class Group:
     @classmethod
     def start(cls, plan: Plan, first: int, count: int) -> Group:
         """Draw the initial populations of the replicas ``first .. first + count - 1``."""
-        processes = plan.model.processes
-        state = new_state(
-            streams(plan.entropy, first, count), len(processes), max(p.entries for p in processes)
-        )
-        populations = [_population(plan, r) for r in range(first, first + count)]
-        state.clock[:, VOLUME] = plan.volume
-        state.clock[:, EXTINCT] = np.nan
-        state.count[:, DOUBLE_AT] = doubles_at(plan.population, plan.particles)
-        state.count[:, PAUSE] = plan.distribution
-        mass = plan.particles * plan.model.initial.largest
+        populations = [initial_population(plan, r) for r in range(first, first + count)]
+        state = empty_state(plan, streams(plan.entropy, first, count))
         rates = rates_for(plan.model, plan.weighting)
+        work = plan.method.new_work(rates, populations, state, plan.mass)
+        return cls.of(plan, first, state, work, windows_for(plan.model.processes, plan.times[-1], plan.weighting))
+
+    @classmethod
+    def of(cls, plan: Plan, first: int, state: State, work: Any, windows: Windows) -> Group:
+        """Start with these particles."""
+        count, processes = len(state.rng), plan.model.processes
+        if plan.start.total > 0.0:  # what begins empty is not doubled
+            state.count[:, DOUBLE_AT] = doubles_at(plan.population, plan.particles)
+        state.count[:, PAUSE] = plan.distribution
         return cls(
             plan,
             first,
             state,
-            plan.method.new_work(rates, populations, state, mass),
+            work,
             new_tally(count, plan.grid, plan.sizes, len(processes)),
             np.full(count, BUDGET, np.int64),
-            windows_for(processes, plan.times[-1]),
+            windows,
             distribution=[[] for _ in range(count if plan.distribution else 0)],
         )
 
@@ -204,7 +207,17 @@ class Group:
         clock[EXCESS] = clock[CLOCKS:].sum()
 
 
-def _population(plan: Plan, replica: int) -> tuple[Int, Int]:
+def empty_state(plan: Plan, rng: Any) -> State:
+    """Return the state at the start but for the particles, for as many replicas as streams."""
+    processes = plan.model.processes
+    state = new_state(rng, len(processes), max(p.entries for p in processes))
+    state.clock[:, VOLUME] = plan.volume
+    state.clock[:, EXTINCT] = np.nan
+    return state
+
+
+def initial_population(plan: Plan, replica: int) -> tuple[Int, Int]:
+    """Draw the initial sizes of a replica and their counts."""
     initial = plan.start
     if isinstance(initial, Sizes) and len(initial.sizes) == 1:  # nothing to draw
         return np.array(initial.sizes), np.array([plan.particles])

@@ -18,7 +18,7 @@ from .executors import adapted, cores, workers_of
 from .methods.base import Method
 from .model import Model
 from .plan import make_plan
-from .replicas import Group
+from .subvolumes import start
 from .weighting.base import Weighting
 
 if TYPE_CHECKING:
@@ -49,6 +49,8 @@ def simulate(
     target_error: float | None = None,
     target: str = "number_density",
     max_replicas: int = 1000,
+    subvolumes: int = 1,
+    remix: float = 1.0,
 ) -> xr.Dataset:
     """Simulate the exact jump process of a model (Marcus-Lushnikov), several replicas of it.
 
@@ -104,6 +106,14 @@ def simulate(
     max_replicas : int
         Where adding replicas ends; then the result has a warning.
 
+    subvolumes : int
+        Parts of each replica that are simulated side by side, one on each core, and mixed again
+        and again: for one large system. Each has at least 1000 particles. What this adds to the
+        bias is of the order of `subvolumes` times that of a finite population, see the page on
+        many cores.
+    remix : float
+        Collisions for each particle from one mixing to the next.
+
     Returns
     -------
     xarray.Dataset
@@ -138,7 +148,7 @@ def simulate(
     try:
         plan = make_plan(
             model, times, method, weighting, population, particles, replicas, seed, orders, sizes,
-            bins_per_octave, distribution, target_error, target, max_replicas,
+            bins_per_octave, distribution, target_error, target, max_replicas, subvolumes, remix,
         )  # fmt: skip
     except InputError as error:
         raise InputError([*error.problems, *problems]) from None
@@ -146,10 +156,11 @@ def simulate(
         raise InputError(problems)
     if executor is not None and not isinstance(executor, ThreadPoolExecutor):
         return Elsewhere(plan, executor, progress, workers_of(executor)).finish()
-    groups = [Group.start(plan, *part) for part in plan.groups(cores())]
+    workers = max(1, cores() // plan.subvolumes)
+    groups = [start(plan, *part) for part in plan.groups(workers)]
     file = None if checkpoint is None else Path(checkpoint).expanduser()
     return Threads(
-        plan, groups, executor, progress, file, checkpoint_every, time_limit, cores()
+        plan, groups, executor, progress, file, checkpoint_every, time_limit, workers
     ).finish()
 
 
@@ -187,8 +198,9 @@ def resume(
         raise InputError(problems)
     file = Path(checkpoint).expanduser()
     plan, groups = checkpoints.load(file, model)
+    workers = max(1, cores() // plan.subvolumes)
     return Threads(
-        plan, groups, executor, progress, file, checkpoint_every, time_limit, cores()
+        plan, groups, executor, progress, file, checkpoint_every, time_limit, workers
     ).finish()
 
 

@@ -48,6 +48,8 @@ class Run:
     target_error: float | None = None
     target: str = "number_density"
     max_replicas: int = 1000
+    subvolumes: int = 1
+    remix: float = 1.0
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments of `smolux.simulate` that decide on the data."""
@@ -119,6 +121,8 @@ def read_run(content: Any, problems: Problems) -> Run | None:
         "sizes": table.integer("sizes", Run.sizes, 1, 10_000_000),
         "bins_per_octave": table.integer("bins_per_octave", Run.bins_per_octave, 1, 100),
         "distribution": table.flag("distribution", Run.distribution),
+        "subvolumes": table.integer("subvolumes", Run.subvolumes, 1, 1024),
+        "remix": table.number("remix", Run.remix, above=0.0),
         "checkpoint_every": table.seconds("checkpoint_every", Run.checkpoint_every),
         "time_limit": table.seconds("time_limit", Run.time_limit),
     }

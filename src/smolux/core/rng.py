@@ -26,11 +26,12 @@ def streams(entropy: int, first: int, count: int) -> np.ndarray:
 
     The words are those of ``numpy.random.SeedSequence(entropy).spawn(...)[replica]``.
     """
-    words = np.empty((count, 4), np.uint64)
-    for k in range(count):
-        sequence = np.random.SeedSequence(entropy, spawn_key=(first + k,))
-        words[k] = sequence.generate_state(4, np.uint64)
-    return words
+    return np.array([stream(entropy, first + k) for k in range(count)])
+
+
+def stream(entropy: int, *key: int) -> np.ndarray:
+    """Seed a stream that is told from others by its key."""
+    return np.random.SeedSequence(entropy, spawn_key=key).generate_state(4, np.uint64)
 
 
 @piece

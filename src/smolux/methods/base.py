@@ -15,6 +15,7 @@ from ..kernels.majorant import Majorant
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
+Words = NDArray[np.uint64]
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,27 @@ class Method:
         """Return the sizes present, ascending, and their counts."""
         raise NotImplementedError
 
+    def split(self, work: Any, state: State, parts: int, copies: int, words: Words) -> list[Any]:
+        """Put every particle of a store of one replica `copies` times into one of several piles.
+
+        Each pile is as likely as the others, and decided by the random `words` alone.
+        """
+        sizes, counts = self.population(work, state, 0)
+        rng = np.random.default_rng(words)
+        shares = rng.multinomial(copies * counts, np.full(parts, 1 / parts))
+        return [(sizes[mine > 0], mine[mine > 0]) for mine in shares.T]
+
+    def collect(self, rates: Rates, piles: list[Any], state: State, mass: int) -> Any:
+        """Return the work arrays of one replica with what `split` has put into these piles."""
+        return self.new_work(rates, [merged(piles)], state, mass)
+
+    def learnt(self, work: Any, state: State) -> Any:
+        """Return what was found out so far that holds for other stores of one replica, or None."""
+        return None
+
+    def use(self, work: Any, state: State, learnt: Any) -> None:
+        """Take over what `learnt` has returned for another store with the same rates."""
+
     def bytes_per_replica(self, particles: int) -> int:
         """Estimate the memory of one replica at its start."""
         raise NotImplementedError
@@ -115,6 +137,15 @@ def spread(sizes: Int, counts: Int, out: Int) -> None:
     for start in range(0, len(out), 1 << 20):
         places = np.arange(start, min(start + (1 << 20), len(out)))
         out[places[0] : places[-1] + 1] = sizes[np.searchsorted(ends, places, side="right")]
+
+
+def merged(populations: list[tuple[Int, Int]]) -> tuple[Int, Int]:
+    """Return the sizes of all populations, ascending, and their counts."""
+    given, numbers = (np.concatenate(arrays) for arrays in zip(*populations, strict=True))
+    sizes, where = np.unique(given, return_inverse=True)
+    counts = np.zeros(len(sizes), np.int64)
+    np.add.at(counts, where, numbers)
+    return sizes, counts
 
 
 def enlarged(array: NDArray[Any], capacity: int) -> NDArray[Any]:

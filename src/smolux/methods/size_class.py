@@ -9,11 +9,12 @@ import numpy as np
 
 from ..core.loop import Pieces
 from ..core.slots import slot_edges
-from ..core.state import LARGEST, PARTICLES, TIME, State
+from ..core.state import PARTICLES, SINCE, TIME, State
 from ..errors import InputError
 from . import size_class_pieces as pieces
-from .base import Int, Method, Rates, enlarged, spread
-from .size_class_store import AHEAD, BITS, CHUNK, FREE, META, NEXT, STALE, WIDEST, Work
+from .base import Int, Method, Rates, Words, enlarged, spread
+from .size_class_deal import Pile, collect, split
+from .size_class_store import AHEAD, BITS, CHUNK, FREE, META, NEXT, SPAN, STALE, WIDEST, Work
 
 #: octaves of sizes by which arrays and bounds are extended
 _OCTAVES = 4
@@ -80,10 +81,10 @@ class SizeClass(Method):
         classes = -(-(_class_of(1 << top, bits) + 1) // block) * block
         work = _empty(replicas, classes, bits, chunk, int(total.max()), largest > _NARROW)
         state.count[:, PARTICLES] = total
-        state.count[:, LARGEST] = [sizes[-1] for sizes, _ in populations]
         edges = slot_edges(bits)
         for r, (sizes, counts) in enumerate(populations):
             _fill(work, r, sizes, counts, edges)
+        work.before[:] = work.number
         return work
 
     def grow(self, work: Work, state: State) -> Work:
@@ -136,6 +137,37 @@ class SizeClass(Method):
             np.concatenate((small, large)).astype(np.int64),
             np.concatenate((number[small], counts)).astype(np.int64),
         )
+
+    def split(self, work: Work, state: State, parts: int, copies: int, words: Words) -> list[Pile]:
+        """See `Method.split`."""
+        return split(work, parts, copies, words)
+
+    def collect(self, rates: Rates, piles: list[Pile], state: State, mass: int) -> Work:
+        """See `Method.collect`; classes are as in the stores from which the piles come."""
+        number = np.zeros(max(len(pile.number) for pile in piles), np.int64)
+        for pile in piles:
+            number[: len(pile.number)] += pile.number
+        total, bits = int(number.sum()), piles[0].bits
+        wide = max(pile.widest for pile in piles) > _NARROW
+        work = _empty(1, len(number), bits, _chunk(total), total, wide)
+        state.count[0, PARTICLES] = total
+        collect(work, piles)
+        work.before[:] = work.number
+        return work
+
+    def learnt(self, work: Work, state: State) -> Any:
+        """See `Method.learnt`: bounds of pairs of classes, and how often a particle comes in."""
+        bits, span = (int(work.meta[0, k]) for k in (BITS, SPAN))
+        return bits, span, int(state.count[0, SINCE]), work.flow[0], work.high, work.low
+
+    def use(self, work: Work, state: State, learnt: Any) -> None:
+        """See `Method.use`."""
+        bits, span, since, flow, high, low = learnt
+        if bits == work.meta[0, BITS]:
+            n = min(len(high), len(work.high))
+            work.high[:n, :n], work.low[:n, :n] = high[:n, :n], low[:n, :n]
+            work.meta[0, SPAN], state.count[0, SINCE] = span, since
+            work.flow[0, :n] = flow[:n]
 
     def bytes_per_replica(self, particles: int) -> int:
         """See `Method.bytes_per_replica`."""

@@ -1,0 +1,242 @@
+"""One replica as sub-volumes, simulated side by side and mixed again and again.
+
+Every particle of a well-mixed system is as likely in one place as in another. So between two
+mixings each sub-volume is a jump process of its own, and at a mixing each particle is put into a
+sub-volume at random. Two particles then meet at the exact rate on average: they share one of `p`
+sub-volumes with probability ``1/p``, and meet there ``p`` times as often.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .assembly import rates_for
+from .core.rng import stream
+from .core.state import (
+    BUDGET,
+    CLOCKS,
+    DONE,
+    DOUBLINGS,
+    EVENTS,
+    EXCESS,
+    EXTINCT,
+    FLOOR,
+    NEXT,
+    PARTICLES,
+    REPAIRS,
+    TIME,
+    TRIALS,
+    VOLUME,
+    WINDOW,
+    WORST_I,
+    WORST_J,
+    State,
+    Tally,
+    Windows,
+    new_tally,
+)
+from .methods.base import merged
+from .plan import LEAST, Plan
+from .population import doubles_at
+from .replicas import Group, empty_state, initial_population
+
+Int = NDArray[np.int64]
+
+#: which random numbers a stream is for
+_PART, _MIXING, _GUESS = 2, 3, 4
+
+
+@dataclass
+class Divided:
+    """A replica in sub-volumes; has what a `smolux.replicas.Group` of one replica has.
+
+    A stretch is the time from one mixing to the next. It depends on the state at its start, not on
+    output times, and its random numbers on its number, so that a run can go on from the latest
+    mixing, bit for bit.
+    """
+
+    plan: Plan
+    first: int
+    state: State
+    tally: Tally
+    codes: Int
+    windows: Windows
+    #: number of the stretch, and how long the next one is
+    stretch: int
+    length: float
+    distribution: list[list[tuple[Int, Int]]] = field(default_factory=list)
+    seconds: float = 0.0
+    compile_seconds: float = 0.0
+    #: the sub-volumes at the end of a stretch, or while it lasts
+    parts: list[Group] = field(default_factory=list)
+
+    @classmethod
+    def start(cls, plan: Plan, replica: int) -> Divided:
+        """Draw the initial population, not yet in sub-volumes."""
+        whole = Group.start(replace(plan, subvolumes=1, replicas=1, distribution=False), replica, 1)
+        state = empty_state(plan, np.zeros((1, 4), np.uint64))
+        state.count[0, PARTICLES] = whole.state.count[0, PARTICLES]
+        return cls(
+            plan,
+            replica,
+            state,
+            new_tally(1, plan.grid, plan.sizes, len(plan.model.processes)),
+            np.full(1, BUDGET, np.int64),
+            whole.windows,
+            stretch=0,
+            length=_first_stretch(plan, replica),
+            distribution=[[] for _ in range(int(plan.distribution))],
+            parts=[whole],
+        )
+
+    @property
+    def done(self) -> bool:
+        """Whether every output time is recorded."""
+        return bool(self.codes[0] == DONE)
+
+    @property
+    def events(self) -> int:
+        """Collisions so far."""
+        return int(self.state.count[0, EVENTS]) + sum(part.events for part in self.parts)
+
+    @property
+    def fraction(self) -> float:
+        """Share of the simulated time that is done."""
+        return min(float(self.state.clock[0, TIME]) / self.plan.times[-1], 1.0)
+
+    def compile(self) -> None:
+        """Compile the loop, or load it from the cache, before any clock runs."""
+        self.parts[0].compile()
+        self.compile_seconds = self.parts[0].compile_seconds
+
+    def advance(self, stop: Callable[[], bool]) -> None:
+        """Go on until done or until `stop` says so, asked after every stretch."""
+        with ThreadPoolExecutor(self.plan.subvolumes) as pool:
+            while not self.done:
+                self._stretch(pool)
+                if stop():
+                    return
+
+    def release(self) -> None:
+        """Give up the particles when done; what was observed stays."""
+        if self.done:
+            self.parts.clear()
+
+    def _stretch(self, pool: ThreadPoolExecutor) -> None:
+        """Mix, and simulate all sub-volumes up to the next mixing."""
+        clock, count = self.state.clock[0], self.state.count[0]
+        start, end = clock[TIME], clock[TIME] + self.length
+        left = self.plan.times[int(count[NEXT]) :]
+        due = [t for t in left if t <= end]
+        if len(due) == len(left):
+            end = due[-1]
+        times = due if due and due[-1] == end else [*due, end]
+        plan = replace(
+            self.plan, times=tuple(times), population="fixed-volume", subvolumes=1, replicas=1
+        )
+        copies = self._doubling()
+        used = max(1, min(self.plan.subvolumes, int(count[PARTICLES]) // LEAST))
+        method, rates = plan.method, rates_for(plan.model, plan.weighting)
+        learnt = method.learnt(self.parts[0].work, self.parts[0].state)
+        window = int(np.searchsorted(self.windows.edges, start, side="right")) - 1
+
+        def split(k: int) -> list[Any]:
+            part, words = self.parts[k], stream(plan.entropy, self.first, _MIXING, self.stretch, k)
+            return method.split(part.work, part.state, used, copies, words)
+
+        def fill(k: int) -> Group:
+            words = stream(plan.entropy, self.first, _PART, self.stretch, k)
+            state = empty_state(plan, words[None])
+            work = method.collect(rates, [given[k] for given in piles], state, plan.mass)
+            state.clock[0, (TIME, VOLUME, FLOOR)] = start, clock[VOLUME] / used, clock[FLOOR]
+            state.clock[0, EXCESS:] = clock[EXCESS:]
+            state.count[0, WINDOW] = window
+            method.use(work, state, learnt)
+            return Group.of(plan, self.first, state, work, self.windows)
+
+        piles = list(pool.map(split, range(len(self.parts))))
+        self.parts.clear()  # room for what follows
+        self.parts += pool.map(fill, range(used))
+        piles.clear()
+        list(pool.map(lambda part: part.advance(lambda: False), self.parts))
+        self._observe(len(due))
+        self._add_up(end)
+
+    def _doubling(self) -> int:
+        """Double the volume as often as the policy says; return how often each particle comes."""
+        clock, count = self.state.clock[0], self.state.count[0]
+        copies = 1
+        while count[PARTICLES] <= doubles_at(self.plan.population, self.plan.particles):
+            copies *= 2
+            count[PARTICLES] *= 2
+            count[DOUBLINGS] += 1
+            clock[VOLUME] *= 2.0
+            clock[EXTINCT] = np.nan
+        return copies
+
+    def _observe(self, due: int) -> None:
+        """Add up what the sub-volumes recorded at the output times of this stretch."""
+        first = int(self.state.count[0, NEXT])
+        rows = slice(first, first + due)
+        for name, values in self.tally._asdict().items():
+            values[0, rows] = sum(getattr(part.tally, name)[0, :due] for part in self.parts)
+        scalars = np.array([part.tally.scalars[0, :due] for part in self.parts])
+        self.tally.scalars[0, rows, 0] = scalars[0, :, 0]
+        self.tally.scalars[0, rows, 2] += self.state.count[0, EVENTS]
+        self.tally.scalars[0, rows, 4] = scalars[:, :, 4].max(axis=0)
+        self.tally.events[0, rows] += self.state.events[0]
+        for k in range(due if self.plan.distribution else 0):
+            self.distribution[0].append(merged([part.distribution[0][k] for part in self.parts]))
+        self.state.count[0, NEXT] += due
+
+    def _add_up(self, end: float) -> None:
+        """Bring the state of the whole up to the end of the stretch, and plan the next."""
+        clock, count = self.state.clock[0], self.state.count[0]
+        counts = sum(part.state.count[0] for part in self.parts)
+        count[[EVENTS, TRIALS, REPAIRS]] += counts[[EVENTS, TRIALS, REPAIRS]]
+        count[PARTICLES] = counts[PARTICLES]
+        for part in self.parts:
+            if part.state.clock[0, FLOOR] > clock[FLOOR]:
+                clock[FLOOR] = part.state.clock[0, FLOOR]
+                count[[WORST_I, WORST_J]] = part.state.count[0, [WORST_I, WORST_J]]
+            np.maximum(clock[CLOCKS:], part.state.clock[0, CLOCKS:], out=clock[CLOCKS:])
+            self.state.events[0] += part.state.events[0]
+            self.seconds += part.seconds
+        clock[EXCESS] = clock[CLOCKS:].sum()
+        if count[PARTICLES] == 1 and np.isnan(clock[EXTINCT]):
+            clock[EXTINCT] = self.parts[0].state.clock[0, EXTINCT]
+        elapsed, clock[TIME] = end - clock[TIME], end
+        self.stretch += 1
+        self.length = 2.0 * elapsed
+        if counts[EVENTS]:
+            wanted = self.plan.remix * counts[PARTICLES] / counts[EVENTS]
+            self.length = min(self.length, wanted * elapsed)
+        if count[NEXT] == len(self.plan.times):
+            self.codes[0] = DONE
+
+
+def _first_stretch(plan: Plan, replica: int) -> float:
+    """Estimate how long it takes until the share of particles has collided after which to mix."""
+    rng = np.random.default_rng(np.random.SeedSequence(plan.entropy, spawn_key=(replica, _GUESS)))
+    sizes, counts = initial_population(plan, replica)
+    i, j = rng.choice(sizes, (2, 1000), p=counts / counts.sum()).astype(float)
+    with np.errstate(all="ignore"):
+        mean = float(np.mean(rates_for(plan.model, plan.weighting).arrays(i, j)))
+    factors = sum(float(process.factor(0.0)) for process in plan.model.processes)
+    each = 0.5 * mean * factors * plan.particles / plan.volume
+    if not (np.isfinite(each) and each > 0):
+        return 1e-3 * plan.times[-1]
+    return min(plan.remix / each, plan.times[-1])
+
+
+def start(plan: Plan, first: int, count: int) -> Group | Divided:
+    """Start the replicas from `first` on; those in sub-volumes one by one."""
+    if plan.subvolumes > 1:
+        return Divided.start(plan, first)
+    return Group.start(plan, first, count)

@@ -1,0 +1,113 @@
+"""One system in sub-volumes that are mixed again and again."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import runs
+
+import smolux as sx
+from smolux import plan, subvolumes
+from smolux.errors import InputError, Interrupted
+from smolux.exact import finite
+
+SETTINGS: dict[str, Any] = {"particles": 4000, "replicas": 2, "seed": 3, "sizes": 40}
+TIMES = [0.0, 0.5, 2.0]
+
+
+def simulate(method: str = "size-class", times: Any = TIMES, **settings: Any) -> Any:
+    given = {"subvolumes": 2, "remix": 0.3} | settings
+    return sx.simulate(runs.model(runs.VARYING), times, method=method, **SETTINGS | given)
+
+
+@pytest.mark.parametrize("method", ["size-class", "acceptance-rejection"])  # their own, and any
+def test_the_same_physics(method: str) -> None:
+    ds = simulate(method, replicas=8)
+    whole = simulate(method, replicas=8, subvolumes=1)
+    assert ds.attrs["subvolumes"] == 2
+    np.testing.assert_array_equal(ds["moment"].sel(order=1), 1.4)
+    assert (ds["particles"] / ds["volume"] == ds["number_density"]).all()
+    for order in (0, 2):
+        a, b = (d["moment"].sel(order=order) for d in (ds, whole))
+        error = np.sqrt((a.var("replica", ddof=1) + b.var("replica", ddof=1)) / 8)
+        # five sigmas of Student's law with 14 degrees of freedom: 2e-4
+        assert (abs(a.mean("replica") - b.mean("replica")) <= 5 * error + 1e-12).all()
+    assert (ds["largest"].isel(time=0) == 3).all()
+
+
+def test_neither_output_times_nor_threads_matter() -> None:
+    expected = simulate()
+    runs.assert_same(expected, simulate())
+    more = simulate(times=[0.0, 0.1, 0.5, 0.7, 2.0])
+    np.testing.assert_array_equal(more["n"].sel(time=TIMES), expected["n"])
+    with ThreadPoolExecutor(1) as pool:
+        runs.assert_same(expected, simulate(executor=pool))
+    assert (simulate(seed=4)["n"] != expected["n"]).any()
+
+
+@pytest.mark.parametrize("distribution", [False, True])
+def test_goes_on_from_a_checkpoint(distribution: bool, tmp_path: Path) -> None:
+    expected = simulate(distribution=distribution)
+    path = tmp_path / "run.npz"
+    with pytest.raises(Interrupted):
+        simulate(checkpoint=path, time_limit=1e-9, distribution=distribution)
+    for _stops in range(1000):
+        try:
+            ds = sx.resume(path, time_limit=1e-9)
+            break
+        except Interrupted:
+            continue
+    runs.assert_same(expected, ds)
+    assert json.loads(ds.attrs["warnings"]) == []
+    if distribution:
+        assert ds["sample_count"].sum() == ds["particles"].sum()
+
+
+def _clusters(remix: float) -> np.ndarray:
+    ds = sx.simulate(
+        sx.Model(kernel=sx.kernels.Constant()), [2.0], method="size-class", particles=16, seed=1,
+        replicas=200, population="fixed-volume", subvolumes=4, remix=remix, sizes=16,
+    )  # fmt: skip
+    return ds["particles"].values[:, 0]
+
+
+def test_mixing_takes_the_bias_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(plan, "LEAST", 4)
+    monkeypatch.setattr(subvolumes, "LEAST", 4)
+    exact = finite.number_mean("constant", 16, 2.0)
+    apart, mixed = _clusters(10.0), _clusters(0.2)
+    error = mixed.std(ddof=1) / np.sqrt(200)
+    assert apart.mean() - exact > 4 * error  # four particles each: not the same system
+    assert abs(mixed.mean() - exact) < 3.5 * error
+    # fluctuations are those of the whole: the variance of 200 values scatters by 10 %
+    variance = finite.number_variance("constant", 16, 2.0)
+    assert 0.6 < mixed.var() / variance < 1.6
+
+
+def test_a_kernel_above_its_bound_is_remembered() -> None:
+    def ridge(i: float, j: float) -> float:
+        return 1.0 + 20.0 * np.exp(-((i - j - 37.0) ** 2)) + 20.0 * np.exp(-((j - i - 37.0) ** 2))
+
+    model = sx.Model(kernel=sx.kernels.from_function(ridge, bounds=lambda a, b, c, d: (1.0, 1.5)))
+    ds = sx.simulate(
+        model, [30.0], particles=4000, replicas=1, seed=1, subvolumes=2, method="size-class"
+    )
+    assert "above its bound" in json.loads(ds.attrs["warnings"])[0]
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"subvolumes": 0}, "subvolumes = 0: must be a whole number of at least 1"),
+        ({"subvolumes": 5}, "each needs 1000 particles or more"),
+        ({"remix": 0.0}, "remix = 0.0: must be a number of collisions for each particle"),
+    ],
+)
+def test_mistakes(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        simulate(**settings)
