@@ -7,16 +7,21 @@ Most take ``ax=`` to draw into axes of your own.
 from .clusters import clusters
 from .comparison import comparison
 from .distribution import size_distribution
+from .movie import movie
 from .oscillation import oscillations
 from .scaling import scaling
 from .series import moments, time_series
+from .spatial import coarsening, discs
 from .style import PALETTE, save
 
 __all__ = [
     "PALETTE",
     "clusters",
+    "coarsening",
     "comparison",
+    "discs",
     "moments",
+    "movie",
     "oscillations",
     "save",
     "scaling",

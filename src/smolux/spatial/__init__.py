@@ -22,6 +22,7 @@ _LAZY = {
     "replay": "result",
     "simulate": "running",
     "system_of": "result",
+    "write_trajectory": "trajectory",
 }
 
 __all__ = [
@@ -40,6 +41,7 @@ __all__ = [
     "replay",
     "simulate",
     "system_of",
+    "write_trajectory",
 ]
 
 if TYPE_CHECKING:
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
     from .result import log_of, replay, system_of
     from .running import SpatialProgress, simulate
     from .system import System
+    from .trajectory import write_trajectory
     from .windowed import Windowed
 
 

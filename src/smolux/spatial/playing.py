@@ -92,10 +92,13 @@ class Player:
         return forest.size[roots], forest.mass[roots], forest.velocity[roots]
 
     def positions(self, time: float) -> tuple[Float, Float, NDArray[np.int32]]:
-        """Return position, velocity and cluster of every disc; nothing can be played after this."""
+        """Return position, velocity and cluster of every disc at a time, up to which was played."""
         n, d = self.system.position.shape
-        x, v, label = np.empty((n, d)), np.empty((n, d)), np.empty(n, np.int32)
-        self._compiled.positions(self.forest, self.system.position, time, x, v, label, self._work)
+        x, v = np.empty((n, d)), np.empty((n, d))
+        label, least = np.empty(n, np.int32), np.empty(n, np.int32)
+        self._compiled.positions(
+            self.forest, self.system.position, time, x, v, label, least, self._work
+        )
         return x, v, label
 
 

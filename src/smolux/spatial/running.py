@@ -182,11 +182,11 @@ class _Driver:
         if self.progress is None:
             return
         run, wanted = self.run, max(self.discs - self.target, 1)
+        speed = run.events / (clock.perf_counter() - self.started)
         done = min((self.discs - run.clusters) / wanted, 1.0)
         self.progress(
             SpatialProgress(
-                run.events, run.clusters, run.time, done, run.events / (clock.perf_counter() - self.started),
-                np.nan, self.compile_seconds,
+                run.events, run.clusters, run.time, done, speed, np.nan, self.compile_seconds
             )
         )  # fmt: skip
 

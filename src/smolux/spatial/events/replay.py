@@ -132,11 +132,9 @@ def replay(forest, merges, x, radius, period, time, first, second, start, stop, 
 
 
 @entry
-def positions(forest, x, time, out, velocity, label, work):
-    """Write position, velocity and cluster of all discs at a time; clusters by their least disc."""
+def positions(forest, x, time, out, velocity, label, least, work):
+    """Write position, velocity and cluster of all discs at a time; clusters by `least` disc."""
     n, d = x.shape
-    label[:] = -1
-    least = forest.node  # scratch: no use is made of the numbers after this
     least[:] = -1
     for i in range(n):
         root = find(forest, i, work[0])

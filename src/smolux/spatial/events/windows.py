@@ -81,8 +81,8 @@ MOST = 0.35
 FRESH = 8
 #: a step of the skin, and how far its costs may be from balance
 STEP, TOO_SMALL, TOO_LARGE = 1.5, 2.0, 0.3
-#: costs of a listing, of a look at a pair and of a prediction, in arbitrary units
-LIST_COST, CHECK_COST, PREDICT_COST = 12.0, 1.0, 5.0
+#: costs of a listing for each cell looked at, of a look at a pair and of a prediction
+LIST_COST, CHECK_COST, PREDICT_COST = 1.3, 1.0, 12.0
 
 
 def bind(d):
@@ -255,7 +255,7 @@ def bind(d):
         listed = count[LISTED] - count[MARK_LISTED]
         if listed < larger(2 * f.place.shape[0], 1000):
             return False
-        often = LIST_COST * listed
+        often = LIST_COST * 3**d * listed
         wide = CHECK_COST * (count[CHECKED] - count[MARK_CHECKED])
         wide += PREDICT_COST * (count[PREDICTED] - count[MARK_PREDICTED])
         count[MARK_LISTED] = count[LISTED]

@@ -1,0 +1,120 @@
+"""Trajectories, figures, movies."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import smolux as sx
+import smolux.spatial as sp
+from smolux import plotting
+
+
+@pytest.fixture(scope="module")
+def result():
+    return sp.simulate(sp.lattice(36, 0.3, seed=2, walls=("periodic", "reflecting")))
+
+
+def read_xyz(file):
+    """Frames of an extended XYZ file: the comment line and the columns as text."""
+    lines = file.read_text().splitlines()
+    while lines:
+        n = int(lines[0])
+        yield lines[1], [line.split() for line in lines[2 : 2 + n]]
+        lines = lines[2 + n :]
+
+
+def test_extended_xyz(result, tmp_path):
+    end = result.attrs["time_reached"]
+    frames = list(read_xyz(sp.write_trajectory(result, tmp_path / "a.xyz", [0, 1.0, end])))
+    assert len(frames) == 3
+    for (comment, rows), time in zip(frames, [0.0, 1.0, end], strict=True):
+        assert f"Time={time!r} " in comment
+        assert 'Lattice="6.0 0 0 0 6.0 0 0 0 0.618' in comment
+        assert 'pbc="T F F"' in comment
+        state = sp.replay(result, time)
+        table = np.array([row[1:] for row in rows], float)
+        box = sp.system_of(result).box
+        np.testing.assert_allclose(table[:, :2], box.wrap(state["position"]), rtol=1e-9, atol=1e-9)
+        np.testing.assert_array_equal(table[:, 2], 0)
+        np.testing.assert_allclose(table[:, 3], state["radius"], rtol=1e-9)
+        np.testing.assert_allclose(table[:, 5:7], state["velocity"], rtol=1e-9)
+        np.testing.assert_array_equal(table[:, 8], state["cluster"])
+    assert len(list(read_xyz(sp.write_trajectory(result, tmp_path / "b.xyz", frames=4)))) == 4
+
+
+def test_gsd(result, tmp_path):
+    hoomd = pytest.importorskip("gsd.hoomd")
+    with hoomd.open(sp.write_trajectory(result, tmp_path / "a.gsd", [0, 1.0])) as trajectory:
+        frame = trajectory[1]
+        assert frame.configuration.dimensions == 2
+        at = frame.particles.position[:, :2] + 3
+        box = sp.system_of(result).box
+        np.testing.assert_allclose(at, box.wrap(sp.replay(result, 1.0)["position"]), atol=1e-5)
+        np.testing.assert_allclose(frame.particles.diameter, 2 * result["radius"], rtol=1e-6)
+
+
+def test_a_missing_package_is_named(result, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "gsd", None)
+    monkeypatch.setitem(sys.modules, "gsd.hoomd", None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(sx.InputError, match=r'pip install "smolux\[spatial\]"'):
+        sp.write_trajectory(result, tmp_path / "a.gsd")
+    with pytest.raises(sx.InputError, match=r'pip install "smolux\[movie\]"'):
+        plotting.movie(result, tmp_path / "a.mp4")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"path": "a.pdb"}, "must end in .xyz or .gsd"),
+        ({"times": [1e9]}, "must lie between 0 and the time reached"),
+        ({"times": [2, 1]}, "must ascend"),
+        ({"frames": 0}, "frames = 0"),
+    ],
+)
+def test_mistakes(result, tmp_path, arguments, words):
+    arguments = {"path": "a.xyz"} | arguments
+    with pytest.raises(sx.InputError) as caught:
+        sp.write_trajectory(result, tmp_path / arguments.pop("path"), **arguments)
+    assert words in str(caught.value)
+
+
+def test_figures(result):
+    for figure in (
+        plotting.discs(result),
+        plotting.discs(result, 1.0, colour="cluster", width="double"),
+        plotting.coarsening(result),
+    ):
+        assert isinstance(figure, Figure)
+    drawn = plotting.discs(result, 1.0).axes[0].collections[0]
+    x = sp.system_of(result).box.wrap(sp.replay(result, 1.0)["position"])
+    np.testing.assert_allclose(drawn.get_offsets(), x)
+    with pytest.raises(sx.InputError, match="colour = 'red'"):
+        plotting.discs(result, colour="red")
+
+
+def test_a_disc_that_touched_nothing_is_grey(result):
+    first = result["first_contact"].values
+    time = float(np.median(first))
+    faces = plotting.discs(result, time).axes[0].collections[0].get_facecolors()
+    grey = (faces[:, :3] == 0.75).all(1)
+    np.testing.assert_array_equal(grey, first > time)
+
+
+def test_movie(result, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    file = plotting.movie(result, tmp_path / "a.gif", frames=3, pixels=120)
+    with image.open(file) as picture:
+        assert picture.n_frames == 3
+        assert picture.size[0] == 120
+        first = np.asarray(picture.convert("RGB"))
+        picture.seek(2)
+        assert (np.asarray(picture.convert("RGB")) != first).any()
+    with pytest.raises(sx.InputError) as caught:
+        plotting.movie(result, tmp_path / "a.avi", rate=0, pixels=121, colour="red")
+    assert len(caught.value.problems) == 4
