@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -72,11 +72,17 @@ class Group:
     @classmethod
     def start(cls, plan: Plan, first: int, count: int) -> Group:
         """Draw the initial populations of the replicas ``first .. first + count - 1``."""
-        populations = [initial_population(plan, r) for r in range(first, first + count)]
+        populations = initial_populations(plan, range(first, first + count))
         state = empty_state(plan, streams(plan.entropy, first, count))
         rates = rates_for(plan.model, plan.weighting)
         work = plan.method.new_work(rates, populations, state, plan.mass)
-        return cls.of(plan, first, state, work, windows_for(plan.model.processes, plan.times[-1], plan.weighting))
+        return cls.of(
+            plan,
+            first,
+            state,
+            work,
+            windows_for(plan.model.processes, plan.times[-1], plan.weighting),
+        )
 
     @classmethod
     def of(cls, plan: Plan, first: int, state: State, work: Any, windows: Windows) -> Group:
@@ -216,13 +222,14 @@ def empty_state(plan: Plan, rng: Any) -> State:
     return state
 
 
-def initial_population(plan: Plan, replica: int) -> tuple[Int, Int]:
-    """Draw the initial sizes of a replica and their counts."""
+def initial_populations(plan: Plan, replicas: Sequence[int]) -> list[tuple[Int, Int]]:
+    """Draw the initial sizes of replicas and their counts."""
     initial = plan.start
     if isinstance(initial, Sizes) and len(initial.sizes) == 1:  # nothing to draw
-        return np.array(initial.sizes), np.array([plan.particles])
-    sequence = np.random.SeedSequence(plan.entropy, spawn_key=(replica, 1))
-    return initial.sample(plan.particles, float(np.random.default_rng(sequence).random()))
+        return [(np.array(initial.sizes), np.array([plan.particles]))] * len(replicas)
+    sequences = (np.random.SeedSequence(plan.entropy, spawn_key=(r, 1)) for r in replicas)
+    draws = (float(np.random.default_rng(sequence).random()) for sequence in sequences)
+    return [initial.sample(plan.particles, u) for u in draws]
 
 
 def _bad_rate(model: Model, state: State, r: int) -> str:

@@ -44,7 +44,7 @@ from .core.state import (
 from .methods.base import merged
 from .plan import LEAST, Plan
 from .population import doubles_at
-from .replicas import Group, empty_state, initial_population
+from .replicas import Group, empty_state, initial_populations
 
 Int = NDArray[np.int64]
 
@@ -224,7 +224,7 @@ class Divided:
 def _first_stretch(plan: Plan, replica: int) -> float:
     """Estimate how long it takes until the share of particles has collided after which to mix."""
     rng = np.random.default_rng(np.random.SeedSequence(plan.entropy, spawn_key=(replica, _GUESS)))
-    sizes, counts = initial_population(plan, replica)
+    sizes, counts = initial_populations(plan, [replica])[0]
     i, j = rng.choice(sizes, (2, 1000), p=counts / counts.sum()).astype(float)
     with np.errstate(all="ignore"):
         mean = float(np.mean(rates_for(plan.model, plan.weighting).arrays(i, j)))

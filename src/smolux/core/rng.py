@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from .compile import piece
+from .seeds import spawned
 
 _R17, _R23, _R45 = np.uint64(17), np.uint64(23), np.uint64(45)
 _R19, _R41 = np.uint64(19), np.uint64(41)
@@ -26,7 +27,7 @@ def streams(entropy: int, first: int, count: int) -> np.ndarray:
 
     The words are those of ``numpy.random.SeedSequence(entropy).spawn(...)[replica]``.
     """
-    return np.array([stream(entropy, first + k) for k in range(count)])
+    return spawned(entropy, np.arange(first, first + count))
 
 
 def stream(entropy: int, *key: int) -> np.ndarray:

@@ -82,8 +82,12 @@ class SizeClass(Method):
         work = _empty(replicas, classes, bits, chunk, int(total.max()), largest > _NARROW)
         state.count[:, PARTICLES] = total
         edges = slot_edges(bits)
-        for r, (sizes, counts) in enumerate(populations):
+        same = all(population is populations[0] for population in populations)
+        for r, (sizes, counts) in enumerate(populations[:1] if same else populations):
             _fill(work, r, sizes, counts, edges)
+        if same:
+            for array in (work.meta, work.number, work.where, work.pool):
+                array[1:] = array[0]
         work.before[:] = work.number
         return work
 
