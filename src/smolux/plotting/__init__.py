@@ -12,6 +12,7 @@ from .oscillation import oscillations
 from .scaling import scaling
 from .series import moments, time_series
 from .spatial import coarsening, discs
+from .spatial_kernel import spatial_kernel
 from .style import PALETTE, save
 
 __all__ = [
@@ -26,5 +27,6 @@ __all__ = [
     "save",
     "scaling",
     "size_distribution",
+    "spatial_kernel",
     "time_series",
 ]

@@ -18,6 +18,8 @@ _LAZY = {
     "lattice": "initial",
     "log_of": "result",
     "lognormal_radii": "initial",
+    "mean_field_model": "kernel",
+    "measured_kernel": "kernel",
     "random": "initial",
     "replay": "result",
     "simulate": "running",
@@ -37,6 +39,8 @@ __all__ = [
     "lattice",
     "log_of",
     "lognormal_radii",
+    "mean_field_model",
+    "measured_kernel",
     "random",
     "replay",
     "simulate",
@@ -48,6 +52,7 @@ if TYPE_CHECKING:
     from .box import Box
     from .direct import AllPairs, Cells
     from .initial import bimodal_radii, lattice, lognormal_radii, random
+    from .kernel import mean_field_model, measured_kernel
     from .methods import METHODS
     from .result import log_of, replay, system_of
     from .running import SpatialProgress, simulate
