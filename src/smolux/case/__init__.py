@@ -35,7 +35,7 @@ from .write import to_toml
 
 __all__ = ["Case", "Output", "Parallel", "Run", "Solve", "load", "parse", "read_value"]
 
-_TABLES = ("kernel", "processes", "initial", "run", "solve", "parallel", "output")
+_TABLES = ("kernel", "processes", "initial", "run", "solve", "parallel", "output", "spatial")
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,20 @@ def load(path: str | os.PathLike[str], sets: Sequence[str] = ()) -> Case:
         With every mistake, each with its line or option.
     """
     file = FilePath(path).expanduser()
+    return parse(read_text(file), file.name, sets)
+
+
+def read_text(path: str | os.PathLike[str]) -> str:
+    """Return the text of a case file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    file = FilePath(path).expanduser()
     try:
-        text = file.read_text(encoding="utf-8")
+        return file.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise InputError(
             f"{os.fspath(path)}: there is no such file; make one with: smolux new {file.stem}"
@@ -141,7 +153,6 @@ def load(path: str | os.PathLike[str], sets: Sequence[str] = ()) -> Case:
         raise InputError(f"{os.fspath(path)}: is not a text file in UTF-8") from None
     except OSError as error:
         raise InputError(f"{os.fspath(path)}: cannot be read: {error.strerror}") from None
-    return parse(text, file.name, sets)
 
 
 def parse(text: str, source: str = "case", sets: Sequence[str] = ()) -> Case:
@@ -165,6 +176,11 @@ def parse(text: str, source: str = "case", sets: Sequence[str] = ()) -> Case:
     InputError
         With every mistake, each with its line or option.
     """
+    return _read(*contents(text, source, sets))
+
+
+def contents(text: str, source: str, sets: Sequence[str] = ()) -> tuple[dict[str, Any], Problems]:
+    """Return the tables of a case file as changed by `sets`, and where mistakes are noted."""
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -172,7 +188,7 @@ def parse(text: str, source: str = "case", sets: Sequence[str] = ()) -> Case:
     problems = Problems(source, line_numbers(text))
     for option in sets:
         _change(content, option, problems)
-    return _read(content, problems)
+    return content, problems
 
 
 def _located(error: tomllib.TOMLDecodeError) -> str:
@@ -184,6 +200,9 @@ def _located(error: tomllib.TOMLDecodeError) -> str:
 
 
 def _read(content: Mapping[str, Any], problems: Problems) -> Case:
+    if "spatial" in content:
+        problems.add(("spatial",), "a case in space can be run and checked, but not this")
+        problems.raise_if_any()
     top = Table(content, (), problems)
     title = top.text("title", "")
     top.known += _TABLES

@@ -18,7 +18,11 @@ def check(
     sets: Sets = None,
 ) -> None:
     """Check a case: mistakes, gelation, extinction, time, memory and size of the output."""
-    from ..case import load
-    from . import checking
+    from ..case import load, spatial
+    from . import checking, flying
 
+    flight = spatial.load(case, sets or ())
+    if flight is not None:
+        typer.echo(flying.described(flight, str(case)))
+        return
     typer.echo(checking.text(load(case, sets or ()), str(case)))

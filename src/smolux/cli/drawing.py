@@ -7,7 +7,7 @@ from pathlib import Path
 
 from .. import plotting
 from ..errors import InputError
-from . import figures, showing
+from . import figures, flying, showing
 
 _DEFAULT = ("clusters", "moments", "size-distribution")
 _DPI = 300
@@ -36,8 +36,14 @@ def draw(path: Path, kinds: Sequence[str], output: Path | None) -> list[Path]:
     """
     if output is not None and len(kinds) != 1:
         raise InputError(f"-o {output}: is one file; choose one figure with --kind")
-    ds, solution = showing.load(path), showing.load_solution(path)
-    folder = showing.find(path).parent
+    ds, folder = showing.load(path), showing.find(path).parent
+    if ds.attrs.get("kind") == "spatial":
+        pictures = [(name, flying.draw(name, ds)) for name in kinds or flying.FIGURES]
+        return [
+            plotting.save(figure, output or folder / f"{name}.png", dpi=_DPI)
+            for name, figure in pictures
+        ]
+    solution = showing.load_solution(path)
     drawn = [(name, figures.draw(name, ds, solution)) for name in kinds or _DEFAULT]
     return [
         plotting.save(figure, output or folder / f"{name}.png", dpi=_DPI) for name, figure in drawn

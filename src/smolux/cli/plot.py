@@ -15,7 +15,8 @@ def plot(
         typer.Option(
             "--kind",
             "-k",
-            help="clusters, moments, size-distribution, oscillations or scaling; may be repeated.",
+            help="clusters, moments, size-distribution, oscillations or scaling; of a run in space "
+            "discs, coarsening or spatial-kernel. May be repeated.",
         ),
     ] = None,
     output: Annotated[

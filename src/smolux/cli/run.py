@@ -23,11 +23,15 @@ def run(
     Ctrl-C, SIGTERM or the time limit stop it without loss; "smolux run FOLDER" goes on from there,
     and the data are bit for bit those of a run without a stop.
     """
-    from ..case import load
+    from ..case import load, spatial
     from ..errors import InputError
-    from . import report, rundir, running, showing
+    from . import flying, report, rundir, running, showing
     from .console import say
 
+    flight = spatial.load(case / "case.toml" if case.is_dir() else case, sets or ())
+    if flight is not None:
+        flying.run(flight, case, output)
+        return
     if case.is_dir():
         if sets or output is not None:
             raise InputError(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..case import Case, load
+from ..case.spatial import SpatialCase
 from ..errors import InputError
 from ..files import replacing
 
@@ -50,12 +51,12 @@ class RunDirectory:
         return load(self.case)
 
 
-def create(case: Case, source: Path, wanted: Path | None) -> RunDirectory:
+def create(case: Case | SpatialCase, source: Path, wanted: Path | None) -> RunDirectory:
     """Make the folder of a new run and put the resolved case there.
 
     Parameters
     ----------
-    case : Case
+    case : Case or SpatialCase
         With its seed.
     source : Path
         The case file, after which the folder is named if none is wanted.

@@ -16,4 +16,9 @@ def show(
     from . import showing
 
     ds = showing.load(path)
+    if ds.attrs.get("kind") == "spatial":
+        from . import flying
+
+        typer.echo(flying.text(ds))
+        return
     typer.echo(showing.text(ds, ds.sizes["time"] if every else showing.MOST))

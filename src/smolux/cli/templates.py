@@ -9,7 +9,14 @@ from pathlib import Path
 from ..errors import InputError, did_you_mean
 
 #: in the order of the list, from simple to special
-TEMPLATES = ("aggregation", "shattering", "oscillations", "custom-formula-kernel", "aerosol")
+TEMPLATES = (
+    "aggregation",
+    "shattering",
+    "oscillations",
+    "custom-formula-kernel",
+    "aerosol",
+    "ballistic-2d",
+)
 
 
 def text(template: str, file: str = "CASE") -> str:

@@ -1,0 +1,188 @@
+"""Discs in a box on the command line: running a case, its text and its figures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from .. import plotting, results, spatial
+from ..case import spatial as cases
+from ..case.spatial import FIGURES, SpatialCase
+from ..errors import InputError, Interrupted, did_you_mean
+from . import rundir
+from .console import amount, duration, say
+from .progress import Display
+from .rundir import RunDirectory
+from .signals import Stopper
+
+_DPI = 200
+
+
+def run(case: SpatialCase, path: Path, output: Path | None) -> None:
+    """Run a case in a folder of its own, or finish what is in one.
+
+    Parameters
+    ----------
+    case : SpatialCase
+    path : Path
+        The case file, or the folder of a run.
+    output : Path, optional
+        The folder that is wanted.
+    """
+    if path.is_dir():
+        directory = rundir.find(path)
+    else:
+        case = case.with_seed()
+        directory = rundir.create(case, path, output)
+    say(f"seed {case.run.seed}, folder {directory.path}")
+    tree = _finished(directory, case)
+    if tree is None:
+        tree = _simulate(case, directory)
+    typer.echo(text(tree))
+    for remark in _write_output(case, tree, directory.path):
+        say(remark)
+    say(f"results and figures are in {directory.path}")
+
+
+def _finished(directory: RunDirectory, case: SpatialCase) -> Any:
+    """Load the results of a run that came to its end; None if there are none."""
+    if not directory.results.is_file():
+        return None
+    tree = results.load(directory.results)
+    begun = tree.attrs.get("case", "")
+    if begun != case.to_toml():
+        raise InputError(
+            f"{directory.path}: its results are of another case; run the case file anew"
+        )
+    return tree if tree.attrs.get("stopped") != "interrupted" else None
+
+
+def _simulate(case: SpatialCase, directory: RunDirectory) -> Any:
+    system = case.run.system()
+    with Stopper() as stopper, Display(stopper.check) as progress:
+        stopper.patient = True
+        try:
+            tree = spatial.simulate(system, progress=progress, **case.run.arguments())
+        except Interrupted as stop:
+            _store(stop.dataset, case, directory)
+            raise Interrupted(
+                f"{stop}; what was reached is in {directory.results}\n"
+                f"begin again with: smolux run {directory.path}"
+            ) from None
+    _store(tree, case, directory)
+    say(f"simulated in {duration(float(tree.attrs['wall_seconds']))}")
+    return tree
+
+
+def _store(tree: Any, case: SpatialCase, directory: RunDirectory) -> None:
+    tree.attrs["case"] = case.to_toml()
+    if case.title:
+        tree.attrs["title"] = case.title
+    results.save(tree, directory.results)
+
+
+def _write_output(case: SpatialCase, tree: Any, folder: Path) -> list[str]:
+    """Write figures, trajectory and movie; return remarks on what could not be made."""
+    wanted = case.output
+    jobs: list[tuple[str, Callable[[], object]]] = [
+        (f"{name}.png", partial(_save, name, tree, folder)) for name in wanted.figures
+    ]
+    if wanted.trajectory != "none":
+        file = folder / f"trajectory.{wanted.trajectory}"
+        jobs.append((file.name, lambda: spatial.write_trajectory(tree, file, frames=wanted.frames)))
+    if wanted.movie:
+        film = folder / "movie.gif"
+        jobs.append((film.name, lambda: plotting.movie(tree, film, frames=wanted.frames)))
+    remarks = []
+    for name, job in jobs:
+        try:
+            job()
+        except InputError as error:
+            remarks.append(f"no {name}: {error}")
+    return remarks
+
+
+def _save(name: str, tree: Any, folder: Path) -> Path:
+    return plotting.save(draw(name, tree), folder / f"{name}.png", dpi=_DPI)
+
+
+def draw(name: str, tree: Any) -> Any:
+    """Draw a figure.
+
+    Parameters
+    ----------
+    name : str
+        Of `FIGURES`.
+    tree : xarray.DataTree
+        A result.
+
+    Raises
+    ------
+    InputError
+        If there is no such kind of figure, or the result holds nothing to draw.
+    """
+    kinds: dict[str, Callable[[Any], Any]] = {
+        "discs": plotting.discs,
+        "coarsening": plotting.coarsening,
+        "spatial-kernel": lambda t: plotting.spatial_kernel(spatial.measured_kernel(t)),
+    }
+    if name not in kinds:
+        raise InputError(f"--kind {name}: no such figure{did_you_mean(name, FIGURES)}")
+    return kinds[name](tree)
+
+
+def text(tree: Any) -> str:
+    """Say how a result was made and what came of it."""
+    a = tree.attrs
+    model = json.loads(a["model"])
+    series = tree["series"].to_dataset()
+    kinds = "discs" if len(model["box"]) == 2 else "spheres"
+    lines = [
+        str(a.get("title", "")),
+        f"{a['method']}, {model['discs']} {kinds}, volume fraction {model['volume_fraction']:.4g}, "
+        f"walls {', '.join(dict.fromkeys(model['walls']))}, seed {a.get('seed', '?')}",
+        "",
+        f"{'time':>12s} {'clusters':>10s} {'mean mass':>12s} {'largest':>10s} {'energy':>12s}",
+    ]
+    reached = series.isel(time=series["clusters"].notnull().values)
+    count = reached.sizes["time"]
+    for k in sorted({round(m * (count - 1) / 11) for m in range(12)} if count else ()):
+        row = reached.isel(time=k)
+        lines.append(
+            f"{float(row['time']):12.5g} {float(row['clusters']):10.0f} "
+            f"{float(row['mean_mass']):12.5g} {float(row['largest']):10.0f} "
+            f"{float(row['kinetic_energy']):12.5g}"
+        )
+    merges, walls = tree["events"].sizes["event"], tree["walls"].sizes["reflection"]
+    lines += ["", f"{merges} merges and {walls} reflections until t = {a['time_reached']:.6g}."]
+    lines += [f"warning: {w}" for w in json.loads(a.get("warnings", "[]"))]
+    return "\n".join(lines).strip()
+
+
+def described(case: cases.SpatialCase, source: str) -> str:
+    """Say what a case is; whether its discs fit has been tried.
+
+    Raises
+    ------
+    InputError
+        If they do not.
+    """
+    system = case.with_seed().run.system()
+    run_ = case.run
+    memory = 450 * len(system)
+    lines = [
+        f"{source} is valid.",
+        "",
+        f"{'title':12s} {case.title}",
+        f"{'system':12s} {system!r}",
+        f"{'velocities':12s} {run_.velocities}",
+        f"{'simulate':12s} {run_.method}, to {run_.clusters} cluster{'s' * (run_.clusters > 1)}"
+        + (f" or t = {run_.until:g}" if run_.until else ""),
+        f"{'memory':12s} about {amount(memory, 'B')}",
+    ]
+    return "\n".join(lines)

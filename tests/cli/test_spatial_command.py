@@ -1,0 +1,86 @@
+"""Discs in a box on the command line."""
+
+from __future__ import annotations
+
+import pytest
+from command import call
+
+from smolux import results
+from smolux.case import load, spatial
+from smolux.errors import InputError
+
+CASE = """\
+title = "few discs"
+[spatial]
+discs = 36
+volume_fraction = 0.3
+seed = 2
+[output]
+figures = ["discs"]
+trajectory = "xyz"
+frames = 2
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "few.toml").write_text(CASE)
+    return tmp_path
+
+
+def test_a_case_from_run_to_movie(folder):
+    assert "36 discs" in call("check", "few.toml").stdout
+    run = call("run", "few.toml")
+    assert "35 merges" in run.stdout
+    for name in ("case.toml", "results.nc", "discs.png", "trajectory.xyz"):
+        assert (folder / "few" / name).is_file()
+    tree = results.load(folder / "few" / "results.nc")
+    assert tree.attrs["seed"] == 2
+    assert tree.attrs["title"] == "few discs"
+    assert spatial.load(folder / "few" / "case.toml") == spatial.load("few.toml")
+    assert call("show", "few").stdout == run.stdout
+    before = (folder / "few" / "results.nc").read_bytes()
+    assert call("run", "few").stdout == run.stdout
+    assert (folder / "few" / "results.nc").read_bytes() == before
+    call("plot", "few", "-k", "coarsening", "-o", "n.pdf")
+    assert (folder / "n.pdf").is_file()
+    assert "did you mean 'discs'" in call("plot", "few", "-k", "disks", code=2).stderr
+    call("movie", "few", "-n", "2", "-p", "64")
+    assert (folder / "few" / "movie.gif").is_file()
+
+
+def test_a_case_in_three_dimensions_without_a_seed_gets_one(folder):
+    sets = ("--set", "spatial.dimension=3", "--set", "spatial.discs=27")
+    text = call("check", "few.toml", *sets).stdout
+    assert "27 spheres" in text
+    case = spatial.load("few.toml", ["spatial.walls=periodic", "spatial.initial=random"])
+    assert case.run.walls == ("periodic",)
+    assert case.with_seed() is case
+    (folder / "new.toml").write_text(CASE.replace("seed = 2\n", ""))
+    assert spatial.load("new.toml").with_seed().run.seed is not None
+
+
+def test_all_mistakes_at_once_with_their_lines(folder):
+    (folder / "bad.toml").write_text(
+        '[spatial]\ndisc = 36\nwalls = "sticky"\nmethod = "windowde"\nradius_sigma = 1.5\n'
+        '[output]\nfigures = ["disks"]\n[kernel]\n'
+    )
+    lines = call("run", "bad.toml", code=2).stderr.splitlines()
+    for line, words in (
+        (1, "spatial.discs is missing"),
+        (2, "spatial.disc: no such key; did you mean 'discs'?"),
+        (3, 'spatial.walls = "sticky"'),
+        (4, "did you mean 'windowed'"),
+        (5, "on a lattice all discs are equal"),
+        (7, "output.figures"),
+        (8, "kernel: no such key"),
+    ):
+        assert any(f"bad.toml, line {line}:" in text and words in text for text in lines), words
+    with pytest.raises(InputError, match="a case in space can be run and checked"):
+        load("few.toml")
+
+
+def test_what_is_not_finished_is_begun_again(folder):
+    call("run", "few.toml", "--set", "spatial.max_events=5", "-o", "cut")
+    assert "limit of 5 events" in call("show", "cut").stdout
