@@ -7,6 +7,7 @@ Most take ``ax=`` to draw into axes of your own.
 from .clusters import clusters
 from .comparison import comparison
 from .distribution import size_distribution
+from .mean_field import mean_field
 from .movie import movie
 from .oscillation import oscillations
 from .scaling import scaling
@@ -21,6 +22,7 @@ __all__ = [
     "coarsening",
     "comparison",
     "discs",
+    "mean_field",
     "moments",
     "movie",
     "oscillations",
