@@ -90,7 +90,9 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)]
+)
 def test_a_signal_stops_without_loss(tmp_path, number, whole):
     (tmp_path / "long.toml").write_text(LONG)
     process = start("run", "long.toml", "-o", "cut", cwd=tmp_path)

@@ -117,6 +117,7 @@ def test_a_target_error(folder):
     assert "replicas = 2: with target_error at least 8" in text
 
 
+@pytest.mark.slow
 def test_processes(folder):
     call(
         "run", "c.toml", "-s", "parallel.executor=processes", "-s", "parallel.workers=2", "-o", "p"

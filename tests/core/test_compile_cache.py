@@ -155,6 +155,7 @@ def test_functions_of_one_name_are_told_apart() -> None:
     assert len({with_root(name) for name in ("math", "cmath", "numpy")}) == 3
 
 
+@pytest.mark.slow
 def test_an_address_that_is_used_again_is_another_function() -> None:
     class Fleeting(types.ModuleType):
         """A module that makes its functions when they are asked for."""
@@ -372,6 +373,7 @@ def run(script: str, cache: Path, *arguments: str, **environment: str) -> Any:
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_entries_of_different_processes_do_not_mix(tmp_path: Path) -> None:
     script = SMALL + "report(*map(float, sys.argv[1:]))"
     for names, hits in (("1", 0), ("2", 0), ("123", 2), ("4321", 3)):
@@ -452,6 +454,7 @@ print(json.dumps([density, statistics["hits"], statistics["misses"]]))
 """
 
 
+@pytest.mark.slow
 def test_each_kernel_keeps_its_own_law(tmp_path: Path) -> None:
     exact = {"constant": 0.8, "user": np.exp(-1.5)}
     script = tmp_path / "script.py"

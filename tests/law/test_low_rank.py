@@ -87,6 +87,7 @@ def _group(kernel: Kernel, method: Any, particles: int, end: float, replicas: in
     return Group.start(plan, 0, replicas)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [WIDE, sx.methods.LowRank(), sx.methods.FictitiousJumps()])
 @pytest.mark.parametrize("kernel", [sx.kernels.Ballistic(), sx.kernels.formula("i + j")], ids=repr)
 def test_a_replica_does_not_depend_on_the_others(kernel: Kernel, method: Any) -> None:
@@ -113,6 +114,7 @@ def test_few_candidates_are_rejected() -> None:
         assert group.state.count[0, TRIALS] < most * group.events
 
 
+@pytest.mark.slow
 def test_one_huge_cluster_and_many_particles() -> None:
     start = sx.initial.Sizes((1, 3, 10**9 + 7), (0.9, 0.099, 0.001))
     model = sx.Model(sx.kernels.Brownian(), initial=start)

@@ -157,6 +157,7 @@ def test_seeds_do_not_depend_on_the_other_points(case: Path, tmp_path: Path, exp
     np.testing.assert_array_equal(ds.sel(place)["moment"], expected.sel(place)["moment"])
 
 
+@pytest.mark.slow
 def test_points_that_differ_in_their_shapes(case: Path, tmp_path: Path) -> None:
     ds = sx.sweep(
         case, ["run.replicas=2,3", "run.method=inverse,acceptance-rejection"],

@@ -70,6 +70,7 @@ def test_there_are_examples():
     assert len(EXAMPLES) >= 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.parent.name)
 def test_example(example, small, tmp_path):
     assert len(example.read_text(encoding="utf-8").splitlines()) < 40

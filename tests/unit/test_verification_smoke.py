@@ -93,6 +93,7 @@ def test_an_item_tells_right_from_wrong():
     assert sum(not check.passed for check in table1.present(_errors(2.0)).checks) >= 2
 
 
+@pytest.mark.slow
 def test_pages_are_written_and_drawn_again(tmp_path, monkeypatch, capsys):
     small = {method: {1000: 40, 10_000: 20} for method in table1.METHODS}
     monkeypatch.setattr(table1, "QUICK", small)
