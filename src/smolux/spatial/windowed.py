@@ -22,7 +22,7 @@ _ROOM = 1 << 16
 #: the skin at the start in mean distances of discs; its least, in diameters: then room is made
 _SKIN, _THIN = 0.6, 1e-3
 #: room for pairs and for events at the start, by disc
-_PAIRS, _EVENTS = 2.5, 3.0
+_PAIRS, _EVENTS = 1.75, 1.75
 #: discs of one cluster share a block from this mean size on
 _BLOCKS_FROM = 4.0
 
@@ -49,7 +49,8 @@ class _State:
     label: NDArray[np.int32]
     velocity: Float
     mass: Float
-    bound: Float
+    #: one of the 2 d columns of the lower and upper bounds
+    bound: Callable[[int], Float]
 
 
 class WindowedRun(Run):
@@ -84,7 +85,7 @@ class WindowedRun(Run):
         self.flight = self._packed(
             _State(
                 system.position, everyone, everyone, system.velocity, system.mass,
-                np.hstack([system.position - room[:, None], system.position + room[:, None]]),
+                lambda k: system.position[:, k % d] + (room if k >= d else -room),
             )
         )  # fmt: skip
 
@@ -111,11 +112,13 @@ class WindowedRun(Run):
             f.radius[:] = system.radius[f.disc[:, flight.NAME]]
         old = np.flatnonzero(new >= 0)
         to = new[old]
-        f.body[to, d : 2 * d] = state.velocity[old]
+        for k in range(d):  # one by one, as copies of all take memory
+            f.body[to, d + k] = state.velocity[old, k]
         f.body[to, 2 * d + flight.SINCE] = clock[flight.TIME]
         f.body[to, 2 * d + flight.MASS] = state.mass[old]
         f.body[to, 2 * d + flight.WAY] = np.inf
-        f.bound[to] = state.bound[old]
+        for k in range(2 * d):
+            f.bound[to, k] = state.bound(k)[old]
         return self._gridded(f)
 
     def _empty(self, n: int, blocks: int, clusters: int) -> Any:
@@ -181,14 +184,15 @@ class WindowedRun(Run):
         x = np.empty_like(f.rel)
         self._packing.positions(f, t, x)
         velocity = f.body[:, d : 2 * d]
+        bound, label = f.bound, f.block[f.disc[:, flight.BLOCK], flight.CLUSTER]
         moved = f.body[:, :d] + velocity * (t - f.body[:, 2 * d + flight.SINCE])[:, None]
         state = _State(
             x,
             f.disc[:, flight.NAME],
-            f.block[f.disc[:, flight.BLOCK], flight.CLUSTER],
+            label,
             velocity,
             f.body[:, 2 * d + flight.MASS],
-            f.bound + np.hstack([moved, moved]),
+            lambda k: bound[:, k] + moved[:, k % d],
         )
         del f, self.flight
         self.flight = self._packed(state)
