@@ -9,7 +9,7 @@ import pytest
 import runs
 
 import smolux as sx
-from smolux.replicas import _population
+from smolux.replicas import initial_populations
 
 INITIALS = {
     "monomers": sx.initial.monodisperse(density=2.0),
@@ -29,7 +29,7 @@ PARTICLES = 1001
 def populations(initial: Any, replicas: int, seed: int = 3) -> list[tuple[Any, Any]]:
     model = runs.model(initial=initial, c1=0.0)
     plan = runs.plan(model, [1.0], runs.METHODS[0], particles=PARTICLES, seed=seed)
-    return [_population(plan, r) for r in range(replicas)]
+    return initial_populations(plan, range(replicas))
 
 
 @every_initial
