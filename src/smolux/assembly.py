@@ -9,15 +9,26 @@ from typing import Any
 
 import numpy as np
 
+from .core import beside, rng
 from .core.compile import digest, piece, user_piece
-from .core.loop import make_loop, tally_one
-from .core.state import Windows
-from .core.weights import make_outcome, make_rate, make_tally, make_weight
+from .core.loop import make_fire, make_loop, make_next_event, tally_one
+from .core.slots import slot_edges
+from .core.state import LIMIT, Parameters, Windows
+from .core.weights import (
+    make_outcome,
+    make_rate,
+    make_replacement,
+    make_stands,
+    make_tally,
+    make_weight,
+)
 from .errors import InputError
 from .methods.base import Method, Rates
 from .model import Model
-from .processes.base import PairProcess
+from .processes import Aggregation, Removal, Source
+from .processes.base import LoneProcess, PairProcess, Process
 from .timefunction import TimeFunction
+from .weighting import Number
 from .weighting.base import Weighting
 
 #: windows of time for bounds of a factor that varies: pieces of each octave, first octave
@@ -35,38 +46,74 @@ def _as_float(rate: Callable[..., Any]) -> Any:
     return value
 
 
-def _outcomes(functions: Sequence[Callable[..., Any]]) -> Any:
-    """Bind the outcomes into one function of the number of the process."""
-    first = piece(functions[0])
-    if len(functions) == 1:
+def _outcome(process: PairProcess) -> Any:
+    """Bind ``outcome(i, j, s, q)`` of one process, `q` being its own parameters."""
+    if type(process).random:
+        drawn = piece(type(process).outcome(rng.uniform))
 
         @piece
-        def last(r, i, j, s, p, q):
-            return first(i, j, s.sizes, s.counts), 3
+        def random(i, j, s, q):
+            return drawn(i, j, s.sizes, s.counts, s.rng, *q)
 
-        return last
-    others = _outcomes(functions[1:])
+        return random
+    plain = piece(type(process).outcome)
+
+    @piece
+    def certain(i, j, s, q):
+        return plain(i, j, s.sizes, s.counts)
+
+    return certain
+
+
+def _outcomes(processes: Sequence[PairProcess]) -> Any:
+    """Bind the outcomes into one function of the number of the process."""
+
+    def bound(processes: Sequence[PairProcess]) -> Any:
+        first = _outcome(processes[0])
+        if len(processes) == 1:
+
+            @piece
+            def last(r, i, j, s, q):
+                return first(i, j, s, q[0])
+
+            return last
+        others = bound(processes[1:])
+
+        @piece
+        def one_of(r, i, j, s, q):
+            if r == 0:
+                return first(i, j, s, q[0])
+            return others(r - 1, i, j, s, q[1:])
+
+        return one_of
+
+    found = bound(processes)
 
     @piece
     def outcome(r, i, j, s, p, q):
-        if r == 0:
-            return first(i, j, s.sizes, s.counts), 3
-        return others(r - 1, i, j, s, p, q)
+        return found(r, i, j, s, q.outcomes), 3
 
     return outcome
 
 
-def _factors(functions: Sequence[Callable[..., Any]]) -> Any:
-    """Bind the factors into one; `q` holds a tuple of parameters for each."""
-    first = user_piece(functions[0])
-    if len(functions) == 1:
+def _factors(processes: Sequence[Process]) -> Any:
+    """Bind the factors into one; `q` holds a tuple of parameters for each; 0 without any."""
+    if not processes:
+
+        @piece
+        def none(r, t, q):
+            return 0.0
+
+        return none
+    first = user_piece(processes[0].factor.rate)
+    if len(processes) == 1:
 
         @piece
         def last(r, t, q):
             return float(first(t, *q[0]))
 
         return last
-    others = _factors(functions[1:])
+    others = _factors(processes[1:])
 
     @piece
     def factor(r, t, q):
@@ -80,25 +127,60 @@ def _factors(functions: Sequence[Callable[..., Any]]) -> Any:
 _loops: dict[tuple[Any, ...], Any] = {}
 
 
+def _kinds(model: Model) -> tuple[list[PairProcess], list[LoneProcess], list[Source]]:
+    """Return the processes by their kind."""
+    pairs = [p for p in model.processes if isinstance(p, PairProcess)]
+    lone = [p for p in model.processes if isinstance(p, LoneProcess)]
+    return pairs, lone, [p for p in model.processes if isinstance(p, Source)]
+
+
+def _key(model: Model, method: Method, weighting: Weighting) -> tuple[Any, ...]:
+    pairs, lone, sources = _kinds(model)
+    weighted = [f for f in (weighting.weight, weighting.factor) if f is not None]
+    functions = [model.kernel.rate, *weighted]
+    functions += [type(p).outcome for p in pairs] + [type(p).outcome for p in lone]
+    functions += [p.law for p in lone]
+    functions += [p.factor.rate for p in model.processes]
+    shape = len(model.kernel.parameters), len(weighted), len(pairs), len(lone), len(sources)
+    return (type(method), *shape, *((type(p), p.splits) for p in lone), *map(digest, functions))
+
+
 def loop_for(model: Model, method: Method, weighting: Weighting) -> Any:
     """Return the compiled loop, the same object for the same physics and method.
 
     The settings of a method are data of its work arrays, those of a weighting parameters.
     """
-    rate, own = model.kernel.rate, len(model.kernel.parameters)
-    outcomes = [type(process).outcome for process in model.processes]
-    factors = [process.factor.rate for process in model.processes]
-    weighted = [f for f in (weighting.weight, weighting.factor) if f is not None]
-    key = (type(method), own, len(weighted), *map(digest, (rate, *outcomes, *factors, *weighted)))
+    key = _key(model, method, weighting)
     if key not in _loops:
-        simulated, outcome, tally = _as_float(rate), _outcomes(outcomes), tally_one
-        if weighting.weight is not None:
-            weight = make_weight(weighting.weight, own)
-            simulated = make_rate(simulated, weighting.weight, weighting.factor, own)
-            outcome, tally = make_outcome(outcome, weight), make_tally(weight)
-        pieces = method.bind(simulated, tally)
-        _loops[key] = make_loop(pieces, outcome, _factors(factors), weighting.weight is not None)
+        _loops[key] = _assembled(model, method, weighting)
     return _loops[key]
+
+
+def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
+    pairs, lone, sources = _kinds(model)
+    own = len(model.kernel.parameters)
+    outcome, factor = _outcomes(pairs or [Aggregation()]), _factors(pairs or [Aggregation()])
+    simulated, tally, weight = _as_float(model.kernel.rate), tally_one, None
+    if weighting.weight is not None:
+        weight = make_weight(weighting.weight, own)
+        simulated = make_rate(simulated, weighting.weight, weighting.factor, own)
+        outcome, tally = make_outcome(outcome, weight), make_tally(weight)
+    pieces = method.bind(simulated, tally)
+    random = weight is not None or any(type(p).random for p in pairs)
+    if not lone and not sources:
+        fire = make_fire(pieces.pair, pieces.update, outcome, factor, random, len(pairs))
+        return make_loop(pieces, make_next_event(pieces.draw), fire)
+    about = [beside.Lone(p.law, type(p).outcome, p.least, p.splits, p.opens) for p in lone]
+    shape = len(pairs), len(lone), len(sources)
+    rate = beside.bind_rates(about)
+    draw_lone = beside.make_lone(pieces.lone, rate, shape[0], shape[1])
+    choose = beside.make_choice(rate, _factors(lone), _factors(sources), *shape)
+    fire = beside.make_fire(
+        pieces, outcome, factor, beside.bind_outcomes(about), choose, make_stands(weight),
+        make_replacement(weight), shape[0], shape[1],
+    )  # fmt: skip
+    next_event = beside.make_next_event(pieces.draw, draw_lone, pieces.seize, *shape)
+    return make_loop(pieces, next_event, fire)
 
 
 def rates_for(model: Model, weighting: Weighting) -> Rates:
@@ -117,9 +199,17 @@ def rates_for(model: Model, weighting: Weighting) -> Rates:
     )
 
 
-def factor_parameters(processes: Sequence[PairProcess]) -> tuple[tuple[float, ...], ...]:
-    """Return the parameters of the rate factors, as the loop takes them."""
-    return tuple(process.factor.parameters for process in processes)
+def factor_parameters(processes: Sequence[Process]) -> Parameters:
+    """Return the parameters of the processes, as the loop takes them."""
+    pairs = [p for p in processes if isinstance(p, PairProcess)]
+    lone = [p for p in processes if isinstance(p, LoneProcess)]
+    return Parameters(
+        tuple(p.factor.parameters for p in pairs or [Aggregation()]),
+        tuple(p.parameters for p in pairs or [Aggregation()]),
+        tuple(p.parameters for p in lone),
+        tuple(p.factor.parameters for p in lone),
+        tuple(p.factor.parameters for p in processes if isinstance(p, Source)),
+    )
 
 
 def _edges(end: float) -> list[float]:
@@ -135,7 +225,9 @@ def _bounds(factor: TimeFunction, end: float) -> tuple[tuple[float, ...], tuple[
     return tuple(edges), tuple(upper for _, upper in pairs)
 
 
-def windows_for(processes: Sequence[PairProcess], end: float) -> Windows:
+def windows_for(
+    processes: Sequence[Process], end: float, weighting: Weighting | None = None
+) -> Windows:
     """Bound the rate factors over windows of time that depend on the factors alone.
 
     A factor that does not vary needs one window without end. Others have four windows an octave of
@@ -156,11 +248,41 @@ def windows_for(processes: Sequence[PairProcess], end: float) -> Windows:
         bounds = [list(row) for row in zip(*columns, strict=True)]
         _check_factors(processes, edges, np.array(bounds), end)
     array = np.array(bounds, float)
-    return Windows(np.array(edges), array, array.sum(axis=1))
+    pairs = sum(isinstance(process, PairProcess) for process in processes)
+    total = array[:, :pairs].sum(axis=1)
+    return Windows(np.array(edges), array, total, *_beside(processes, weighting or Number()))
+
+
+def inflow(processes: Sequence[Process], weighting: Weighting) -> float:
+    """Return the simulated particles that come in for a unit of volume and time, at the start."""
+    tables = [(p.table, p.factor(0.0)) for p in processes if isinstance(p, Source)]
+    return float(sum(f * rates @ weighting.weights(sizes) for (sizes, rates), f in tables))
+
+
+def _beside(processes: Sequence[Process], weighting: Weighting) -> tuple[Any, ...]:
+    """Tables of single particles and of sources, see `smolux.core.state.Windows`."""
+    edges = slot_edges(beside.CEILING_BITS).astype(float)
+    low, high = edges[1:-1], edges[2:] - 1.0
+    lone = [p for p in processes if isinstance(p, LoneProcess)]
+    ceiling = np.zeros((len(lone), len(edges) - 1))
+    for k, process in enumerate(lone):
+        ceiling[k, 1:] = np.maximum.accumulate(process.ceiling(low, high))
+    tables = [p.table for p in processes if isinstance(p, Source)]
+    most = max((len(sizes) for sizes, _ in tables), default=0)
+    size, share = np.ones((len(tables), most), np.int64), np.ones((len(tables), most))
+    inflow = np.zeros(len(tables))
+    for k, (sizes, rates) in enumerate(tables):
+        simulated = rates * weighting.weights(sizes)
+        inflow[k] = simulated.sum()
+        size[k, : len(sizes)] = sizes
+        share[k, : len(sizes)] = np.cumsum(simulated) / inflow[k]
+        share[k, len(sizes) - 1 :] = 1.0
+    cut = [(p.above or LIMIT, k) for k, p in enumerate(processes) if isinstance(p, Removal)]
+    return ceiling, inflow, size, share, np.array(min(cut, default=(LIMIT, 0)), np.int64)
 
 
 def _check_factors(
-    processes: Sequence[PairProcess], edges: list[float], bounds: Any, end: float
+    processes: Sequence[Process], edges: list[float], bounds: Any, end: float
 ) -> None:
     problems = []
     times = np.linspace(0.0, end, 1001)

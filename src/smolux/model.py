@@ -9,8 +9,8 @@ from typing import Any
 from .errors import InputError
 from .initial import Initial, monodisperse
 from .kernels.base import Kernel
-from .processes import Aggregation
-from .processes.base import PairProcess
+from .processes import Aggregation, Removal, Source
+from .processes.base import Process
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,9 @@ class Model:
     ----------
     kernel : Kernel
         The collision rate, see `smolux.kernels`.
-    processes : sequence of PairProcess
-        What encounters lead to, see `smolux.processes`; aggregation alone if left out.
+    processes : sequence of Process
+        What happens to pairs, to single particles, and from outside, see `smolux.processes`;
+        aggregation alone if left out. They are kept in this order.
     initial : Initial
         Sizes at time zero, see `smolux.initial`; monomers of unit density if left out.
 
@@ -34,7 +35,7 @@ class Model:
     """
 
     kernel: Kernel
-    processes: Sequence[PairProcess] = field(default_factory=lambda: (Aggregation(),))
+    processes: Sequence[Process] = field(default_factory=lambda: (Aggregation(),))
     initial: Initial = field(default_factory=monodisperse)
 
     def __post_init__(self) -> None:
@@ -45,6 +46,8 @@ class Model:
                 "wrap a function K(i, j) with smolux.kernels.from_function(K)"
             )
         processes = _processes(self.processes)
+        if all(isinstance(p, Process) for p in processes):
+            processes = tuple(sorted(processes, key=lambda process: process.kind))
         object.__setattr__(self, "processes", processes)
         if not processes:
             problems.append(
@@ -53,9 +56,9 @@ class Model:
         problems += [
             f"process {p!r}: must be an instance such as smolux.processes.Shattering(0.01)"
             for p in processes
-            if not isinstance(p, PairProcess)
+            if not isinstance(p, Process)
         ]
-        names = [p.name for p in processes if isinstance(p, PairProcess)]
+        names = [p.name for p in processes if isinstance(p, Process)]
         problems += [
             f"process {n!r} is given {names.count(n)} times: give it once"
             for n in set(names)
@@ -67,12 +70,44 @@ class Model:
                 "smolux.initial.monodisperse() or smolux.initial.from_sizes({1: 0.5, 2: 0.5})"
             )
         if not problems:
+            problems = _open_problems(processes, self.initial)
+        if not problems:
             problems = self.kernel.problems(self.initial.largest)
         if problems:
             raise InputError(problems)
 
+    @property
+    def open(self) -> bool:
+        """Whether mass comes in or leaves."""
+        return any(process.opens for process in self.processes)
+
+    @property
+    def cut(self) -> int | None:
+        """The size above which particles leave at once, if there is one."""
+        limits = [p.above for p in self.processes if isinstance(p, Removal) and p.above is not None]
+        return min(limits, default=None)
+
+
+def _open_problems(processes: Sequence[Process], initial: Initial) -> list[str]:
+    """Return what is wrong with the ways into the system and out of it."""
+    problems = []
+    sources = [p for p in processes if isinstance(p, Source)]
+    if not initial.total > 0.0 and not sources:
+        problems.append(
+            "initial = empty(): nothing would ever happen: give a source, such as "
+            "smolux.processes.Source(1.0), or an initial condition"
+        )
+    for removal in (p for p in processes if isinstance(p, Removal)):
+        largest = max([initial.largest, *(int(s.table[0][-1]) for s in sources)])
+        if removal.above is not None and largest > removal.above:
+            problems.append(
+                f"removal: above = {removal.above}: sizes reach {largest} at the start or from a "
+                "source; they would leave at once: raise it, or begin with smaller sizes"
+            )
+    return problems
+
 
 def _processes(given: Any) -> tuple[Any, ...]:
     """Return what was given as processes, one or several, right or wrong, as a tuple."""
-    single = isinstance(given, (PairProcess, str)) or not isinstance(given, Iterable)
+    single = isinstance(given, (Process, str)) or not isinstance(given, Iterable)
     return (given,) if single else tuple(given)

@@ -15,7 +15,8 @@ from .initial import INITIALS, Initial, Sizes, from_sizes, monodisperse
 from .kernels.base import Kernel
 from .model import Model
 from .processes import PROCESSES
-from .processes.base import PairProcess
+from .processes.base import Process
+from .sizefunction import SizeFunction
 from .timefunction import TimeFunction
 
 T = TypeVar("T")
@@ -30,18 +31,25 @@ def _function(user: Function) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Return plain Python numbers and texts; of a function, its text."""
+    """Return plain Python numbers, texts, lists and tables; of a function, its text."""
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, (str, int, float)) or value is None:
         return value
-    rate = TimeFunction.of(value)
-    if rate.user is not None:
-        return _function(rate.user)
-    return rate.text if rate.constant is None else rate.constant
+    if isinstance(value, Kernel):
+        return _kernel_to_dict(value)
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (Sequence, np.ndarray)):
+        return [_plain(v) for v in value]
+    if isinstance(value, (TimeFunction, SizeFunction)):
+        if value.user is not None:
+            return _function(value.user)
+        return value.text if value.constant is None else value.constant
+    return _function(Function(getattr(value, "py_func", value), (), ()))
 
 
-def _fields(thing: PairProcess | Initial) -> dict[str, Any]:
+def _fields(thing: Process | Initial) -> dict[str, Any]:
     return {f.name: _plain(getattr(thing, f.name)) for f in fields(thing)}
 
 
@@ -140,7 +148,7 @@ class _Reader:
             return None
         return self.attempt("kernel", kernels.from_dict, given)
 
-    def process(self, given: Any) -> PairProcess | None:
+    def process(self, given: Any) -> Process | None:
         """Rebuild a process."""
         kinds = {p.name: p for p in PROCESSES}
         name, rest = self.table("process", given, list(kinds))

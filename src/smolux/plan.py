@@ -18,10 +18,11 @@ from .errors import InputError, did_you_mean
 from .goal import Goal, make_goal, whole
 from .initial import Initial
 from .methods import METHODS, SizeClass
-from .methods.auto import Auto, choose
+from .methods.auto import Auto, choose, unforeseen
 from .methods.base import Method
 from .model import Model
 from .population import POPULATIONS
+from .processes.base import PairProcess
 from .weighting import WEIGHTINGS
 from .weighting.base import Weighting
 
@@ -172,12 +173,15 @@ def _with_method(plan: Plan) -> Plan:
     if plan.subvolumes > 1:
         return replace(plan, method=SizeClass(), reason="it mixes sub-volumes in the least time")
     initial, processes = plan.model.initial, plan.model.processes
+    chosen = unforeseen(processes)
+    if chosen is not None:
+        return replace(plan, method=chosen[0], reason=chosen[1])
     sizes, counts = initial.sample(min(plan.particles, 1000), 0.5)
     mass = float(sizes @ counts)
     means = mass / float(counts.sum()), float(sizes.astype(float) ** 2 @ counts) / mass
     method, reason = choose(
         rates_for(plan.model, plan.weighting),
-        processes,
+        [p for p in processes if isinstance(p, PairProcess)],
         plan.particles,
         initial.total,
         means,

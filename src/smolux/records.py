@@ -33,6 +33,9 @@ class Records:
         Collisions so far that ended in each of `processes`.
     extinction_time : ndarray of shape (R,)
         When all particles had become one cluster; NaN if they had not.
+    balance : tuple of ndarray of shape (R, T), optional
+        Of systems that are open: mass in the volume simulated, mass that came in and mass that
+        left, both as if the volume had always been that of now.
     distribution : list of list of (sizes, counts), optional
         The whole population of each replica at each time.
     """
@@ -51,6 +54,7 @@ class Records:
     n_bin: Float
     events: Float
     extinction_time: Float
+    balance: tuple[Float, Float, Float] | None = None
     distribution: list[list[tuple[Int, Int]]] | None = None
     #: further attributes of the result: method, seed, wall time, ...
     attributes: dict[str, Any] = field(default_factory=dict)

@@ -115,6 +115,13 @@ def _ragged(records: Records) -> dict[str, Any]:
     }
 
 
+#: of systems that are open, see `Records.balance`
+_BALANCE = {
+    "mass": "mass in the simulated volume, in monomers",
+    "mass_in": "mass that sources have brought into this volume",
+    "mass_out": "mass that has left this volume",
+}
+
 _RAGGED_NAMES = {
     "instance_replica": "replica of a population",
     "instance_time": "time of a population",
@@ -178,8 +185,12 @@ def to_dataset(model: Model, records: Records) -> xr.Dataset:
         name: (dims, np.asarray(getattr(records, name), float))
         for name, (dims, _) in VARIABLES.items()
     }
+    if records.balance is not None:
+        mass = (np.asarray(column, float) for column in records.balance)
+        values |= {k: (("replica", "time"), m) for k, m in zip(_BALANCE, mass, strict=True)}
     ds = xr.Dataset({**values, **ragged}, coordinates, _provenance(model, records))
-    long_names = _COORDINATES | _RAGGED_NAMES | {k: text for k, (_, text) in VARIABLES.items()}
+    long_names = _COORDINATES | _RAGGED_NAMES | _BALANCE
+    long_names |= {k: text for k, (_, text) in VARIABLES.items()}
     for name in map(str, ds.variables):
         ds[name].attrs["long_name"] = long_names[name]
         if name not in ("process", "replica", "instance_replica"):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,5 +89,40 @@ def pairs(
                     for r, out in gone:
                         if r > 1e-12:
                             yield rate * share * p * r, put(state, out, [size] * count)
+
+    return moves
+
+
+def evaporation(rate: float, weight: Callable[[int], float]) -> Moves:
+    """Each particle of size k > 1 is replaced by ``k - 1`` and 1, ``w(k') / w(k)`` of each.
+
+    Both numbers are rounded by one uniform number, so that their sum is next to its mean.
+    """
+
+    def moves(state: State) -> Iterator[tuple[float, State]]:
+        for a, k in enumerate(state):
+            if k == 1 or rate == 0.0:
+                continue
+            means = [2 * weight(1) / weight(2)] if k == 2 else [
+                weight(k - 1) / weight(k), weight(1) / weight(k)
+            ]  # fmt: skip
+            ends = np.cumsum(means)
+            cuts = sorted({0.0, 1.0, *(1.0 - (end % 1.0) for end in ends)})
+            for low, high in pairwise(cuts):
+                if high - low < 1e-9:
+                    continue
+                upto = np.floor(ends + 0.5 * (low + high) + 1e-9).astype(int)
+                made = np.diff(upto, prepend=0)
+                sizes = [1] if k == 2 else [k - 1, 1]
+                come = [s for s, c in zip(sizes, made, strict=True) for _ in range(c)]
+                yield rate * (high - low), put(state, (a,), come)
+
+    return moves
+
+
+def both(one: Moves, other: Moves) -> Moves:
+    def moves(state: State) -> Iterator[tuple[float, State]]:
+        yield from one(state)
+        yield from other(state)
 
     return moves

@@ -1,7 +1,7 @@
 """Every weighting with every method: exact laws of small systems, means of large ones, bias.
 
-All weights are powers of the size, which are data: mass flow is the power one. So each method has
-one compiled loop here.
+All weights are powers of the size, which are data: mass flow is the power one, direct simulation
+the power zero. So each method has one compiled loop here, with single particles that evaporate.
 """
 
 from __future__ import annotations
@@ -25,27 +25,46 @@ def power(q: float) -> Any:
     return sx.weighting.WeightFunction(q)
 
 
+def model(
+    law: str, shattering: float = 0.0, evaporation: float = 0.0, initial: Any = None
+) -> sx.Model:
+    """Make a model whose rates are data."""
+    p = sx.processes
+    processes = [p.Aggregation(), p.Shattering(shattering), p.Evaporation(evaporation)]
+    return sx.Model(laws.kernel(law), processes, initial or sx.initial.monodisperse())
+
+
 every_method = pytest.mark.parametrize("method", METHODS)
 
 
 # --- small systems -------------------------------------------------------------------------------
 
-#: power, shattering rate, events that are followed
-CHAINS = [(0.5, 0.3, 5), (1.0, 0.3, 5), (1.25, 0.0, 4), (-0.5, 0.1, 4)]
+#: power, rates of shattering and of evaporation, events that are followed
+CHAINS = [
+    (0.0, 0.1, 0.7, 7),
+    (0.5, 0.3, 0.0, 5),
+    (1.0, 0.3, 0.7, 6),
+    (1.25, 0.0, 0.0, 4),
+    (-0.5, 0.1, 0.0, 4),
+]
 
 
 @pytest.fixture(scope="module")
 def expected() -> dict[float, Any]:
     """States of three simulated particles and their probabilities, by the power."""
 
-    def solved(q: float, shattering: float, depth: int) -> Any:
+    def solved(q: float, shattering: float, evaporation: float, depth: int) -> Any:
         def kernel(i: int, j: int) -> float:
-            return 1.0 + 0.5 * (i + j)
+            return 1.0 + 0.5 * (i + j) + 0.25 * i * j
 
-        moves = chains.pairs(kernel, lambda size: size**q, 3.0, shattering)
-        return chains.law((1, 1, 1), moves, (0.4,), depth)
+        def weight(size: int) -> float:
+            return float(size) ** q
 
-    return {q: solved(q, shattering, depth) for q, shattering, depth in CHAINS}
+        moves = chains.pairs(kernel, weight, 3.0, shattering)
+        moves = chains.both(moves, chains.evaporation(evaporation, weight))
+        return chains.law((1, 1, 1), moves, (0.3,), depth)
+
+    return {case[0]: solved(*case) for case in CHAINS}
 
 
 def states(ds: Any, weighting: Any, sizes: int) -> list[tuple[int, ...]]:
@@ -55,19 +74,17 @@ def states(ds: Any, weighting: Any, sizes: int) -> list[tuple[int, ...]]:
     return [tuple(np.repeat(np.arange(1, sizes + 1), row).tolist()) for row in counts]
 
 
-@pytest.mark.parametrize(("q", "shattering", "depth"), CHAINS)
+@pytest.mark.parametrize(("q", "shattering", "evaporation", "depth"), CHAINS)
 @every_method
 def test_whole_distribution(
-    method: str, q: float, shattering: float, depth: int, expected: Any
+    method: str, q: float, shattering: float, evaporation: float, depth: int, expected: Any
 ) -> None:
     """Three monomers at the start: all states against the Markov chain."""
     replicas = 3000
     weighting = MASS_FLOW if q == 1.0 else power(q)
-    kernel = sx.kernels.formula("c0 + c1*(i + j) + c2*i*j", c0=1.0, c1=0.5, c2=0.0)
-    processes = [sx.processes.Aggregation(), sx.processes.Shattering(shattering)]
     ds = sx.simulate(
-        sx.Model(kernel, processes), [0.4], method=method, weighting=weighting, particles=3,
-        population="fixed-volume", replicas=replicas, seed=31, sizes=40,
+        model("bilinear", shattering, evaporation), [0.3], method=method, weighting=weighting,
+        particles=3, population="fixed-volume", replicas=replicas, seed=31, sizes=40,
     )  # fmt: skip
     place, p = expected[q]
     observed = np.zeros(p.shape[1])
@@ -85,7 +102,7 @@ def test_means(method: str, weighting: Any) -> None:
     """Moments and densities of the additive kernel, counted by themselves and in bins."""
     times, replicas = np.array([0.5, 1.5]), 24
     ds = sx.simulate(
-        laws.model("additive"), times, method=method, weighting=weighting, particles=1000,
+        model("additive"), times, method=method, weighting=weighting, particles=1000,
         replicas=replicas, seed=32, sizes=8,
     )  # fmt: skip
     truth = laws.solution("additive")
@@ -101,7 +118,7 @@ def test_means(method: str, weighting: Any) -> None:
 @every_method
 def test_mass_flow_keeps_number_and_mass(method: str) -> None:
     ds = sx.simulate(
-        laws.model("bilinear", 0.05), [0.5, 2.0], method=method, weighting=MASS_FLOW,
+        model("bilinear", 0.05, 0.2), [0.5, 2.0], method=method, weighting=MASS_FLOW,
         particles=500, replicas=4, seed=33,
     )  # fmt: skip
     assert (ds["particles"] == 500).all()
@@ -113,10 +130,9 @@ def test_mass_flow_keeps_number_and_mass(method: str) -> None:
 def test_start_with_many_sizes(weighting: Any) -> None:
     """Simulated particles are drawn by number times weight; a law with a tail, and listed sizes."""
     for initial in (sx.initial.exponential(5.0, 2.0), sx.initial.from_sizes({1: 0.5, 1000: 0.01})):
-        model = sx.Model(laws.kernel("additive"), laws.model("additive").processes, initial)
         ds = sx.simulate(
-            model, [0.0, 1e-9], method="acceptance-rejection", weighting=weighting,
-            particles=20_000, replicas=4, seed=34,
+            model("additive", initial=initial), [0.0, 1e-9], method="acceptance-rejection",
+            weighting=weighting, particles=20_000, replicas=4, seed=34,
         )  # fmt: skip
         k = np.arange(1.0, initial.largest + 1.0)
         n = initial.densities(initial.largest)
@@ -177,7 +193,7 @@ def test_bias_of_the_second_moment(q: float, particles: int) -> None:
     )
     weighting = MASS_FLOW if q == 1.0 else power(q)
     ds = sx.simulate(
-        laws.model("constant"), [20.0], method="acceptance-rejection", weighting=weighting,
+        model("constant"), [20.0], method="acceptance-rejection", weighting=weighting,
         population="fixed-volume", particles=particles, replicas=2000, seed=35, orders=(2,),
         sizes=8,
     )  # fmt: skip

@@ -9,12 +9,13 @@ from typing import Any
 
 from .. import units
 from ..errors import InputError, did_you_mean
-from ..initial import INITIALS, Initial, Sizes
+from ..initial import INITIALS, Empty, Initial, Sizes
 from ..kernels import KERNELS
 from ..kernels.base import Kernel
 from ..model import Model
 from ..model_dict import model_from_dict, model_to_dict
 from ..processes import PROCESSES
+from ..processes.base import Process
 from ..units import Dimension
 from .lines import Path
 from .reader import Problems, Table, show
@@ -240,16 +241,33 @@ def _processes(content: Any, problems: Problems) -> list[dict[str, Any]]:
         data = {"name": name}
         for f in fields(kinds[name]):
             value = table.take(f.name)
+            words = _of_process(kinds[name], f.name)
             if value is None:
                 if f.default is MISSING:
-                    table.require(f.name, 'a number, or a formula in t such as "0.01*(1 - t/400)"')
+                    table.require(f.name, words)
             elif isinstance(value, (int, float, str)) and not isinstance(value, bool):
                 data[f.name] = value if isinstance(value, str) else float(value)
+            elif (isinstance(value, list) and "a list" in words) or (
+                isinstance(value, Mapping) and "a table" in words
+            ):
+                data[f.name] = value
             else:
-                table.bad(f.name, 'must be a number or a formula in t such as "0.01*(1 - t/400)"')
+                table.bad(f.name, f"must be {words}")
         table.finish()
         found.append(data)
     return found
+
+
+def _of_process(kind: type[Process], key: str) -> str:
+    """Return in words what a parameter of a process may be."""
+    variable = getattr(kind, "variables", {"rate": "t"}).get(key)
+    if variable == "t":
+        return 'a number or a formula in t such as "0.01*(1 - t/400)"'
+    if variable == "k":
+        return 'a number, a formula in k such as "k**(2/3)", or a list of values for k = 1, 2, ...'
+    if variable is not None:
+        return f'a number, a formula in {variable} such as "1/(i*j)", or a table as of a kernel'
+    return "a number, or a table of sizes and rates" if key == "rates" else "a number"
 
 
 def _initial(table: Table) -> dict[str, Any]:
@@ -302,7 +320,7 @@ def _require_units(data: Mapping[str, Any], problems: Problems) -> None:
             f"kernel.scale is missing: the case has units, so the kernel needs "
             f"{units.KERNEL.words} such as {show(units.KERNEL.example)}{instead}",
         )
-    if initial.get("name") != Sizes.name and "density" not in initial:
+    if initial.get("name") not in (Sizes.name, Empty.name) and "density" not in initial:
         problems.add(
             ("initial",),
             "initial.density is missing: the case has units, so it needs "

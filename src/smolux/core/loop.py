@@ -1,6 +1,6 @@
 """The one event loop.
 
-A method brings seven `Pieces`, a model two; they are bound by closure and inlined. A piece that
+A method brings nine `Pieces`, a model two; they are bound by closure and inlined. A piece that
 needs another one, or the rate, is made by a function that takes it: a compiled function passed as
 an argument could not be kept in the cache.
 
@@ -35,6 +35,8 @@ from .state import (
     GROW,
     LARGEST,
     LIMIT,
+    MASS_IN,
+    MASS_OUT,
     NEXT,
     PARTICLES,
     PAUSE,
@@ -59,26 +61,34 @@ from .state import (
 _ROUNDING = 1.0 + 1e-12
 
 
-@piece
-def choose_process(s, windows, factor, q):
-    """Choose the process of the pending event, or none: thinning by the true factor at its time."""
-    window = s.count[WINDOW]
-    if windows.bounds.shape[1] == 1 and windows.edges[window + 1] == math.inf:
-        return 0
-    x = rng.uniform(s.rng) * (windows.total[window] + s.clock[EXCESS])
-    r = 0
-    bound = windows.bounds[window, 0] + s.clock[CLOCKS]
-    while r < windows.bounds.shape[1] - 1 and x >= bound:
-        x -= bound
-        r += 1
-        bound = windows.bounds[window, r] + s.clock[CLOCKS + r]
-    value = factor(r, s.clock[PENDING], q)
-    if not 0.0 <= value <= bound * _ROUNDING:
-        s.clock[VALUE] = value
-        s.count[PROCESS] = r
-        return -2 if not 0.0 <= value < math.inf else -3
-    # x is uniform below the bound, and serves again
-    return r if x < value else -1
+def make_choose_process(pairs: int) -> Callable[..., Any]:
+    """Bind the choice of the process of an encounter, of the first `pairs` ones."""
+
+    @piece
+    def choose_process(s, windows, factor, q):
+        """Choose the process, or none: thinning by the true factor at the time of the event."""
+        window = s.count[WINDOW]
+        if pairs == 1 and windows.edges[window + 1] == math.inf:
+            return 0
+        excess = 0.0
+        for r in range(pairs):
+            excess += s.clock[CLOCKS + r]
+        x = rng.uniform(s.rng) * (windows.total[window] + excess)
+        r = 0
+        bound = windows.bounds[window, 0] + s.clock[CLOCKS]
+        while r < pairs - 1 and x >= bound:
+            x -= bound
+            r += 1
+            bound = windows.bounds[window, r] + s.clock[CLOCKS + r]
+        value = factor(r, s.clock[PENDING], q.factors)
+        if not 0.0 <= value <= bound * _ROUNDING:
+            s.clock[VALUE] = value
+            s.count[PROCESS] = r
+            return -2 if not 0.0 <= value < math.inf else -3
+        # x is uniform below the bound, and serves again
+        return r if x < value else -1
+
+    return choose_process
 
 
 class Pieces(NamedTuple):
@@ -101,6 +111,10 @@ class Pieces(NamedTuple):
         Bring bounds up to date; 0 or the reason to return.
     double : ``double(s, w)``
         Put every particle in once more; False, with nothing changed, if there is no room.
+    lone : ``lone(s, w, k)``
+        Place and size of particle `k`, ``0 <= k < count[PARTICLES]``, in any order.
+    seize : ``seize(s, w, place)``
+        Put that particle in the place of the first of the pair.
     visit : ``visit(s, w, t, grid, p)``
         Call the `tally` that `Method.bind` was given for the particles present, and return the
         largest size.
@@ -112,6 +126,8 @@ class Pieces(NamedTuple):
     update: Any
     prepare: Any
     double: Any
+    lone: Any
+    seize: Any
     visit: Any
 
 
@@ -119,7 +135,7 @@ def make_next_event(draw: Callable[..., Any]) -> Callable[..., Any]:
     """Bind the drawing of the next event: population policy, bounds, waiting time, window."""
 
     @piece
-    def next_event(s, w, windows, p):
+    def next_event(s, w, windows, p, q):
         window = s.count[WINDOW]
         total = windows.total[window] + s.clock[EXCESS]
         wait = math.inf
@@ -147,8 +163,26 @@ def make_fire(
     outcome: Callable[..., Any],
     factor: Callable[..., Any],
     random: bool,
+    pairs: int,
 ) -> Callable[..., Any]:
-    """Bind what happens when the pending event comes: 0 or the reason to return."""
+    """Bind what happens when the pending event comes: 0 or the reason to return.
+
+    Parameters
+    ----------
+    pair, update : callable
+        Of the method, see `Pieces`.
+    outcome : callable
+        ``outcome(r, i, j, s, p, q)``: writes what process `r` makes of the sizes `i` and `j` into
+        ``s.sizes`` and ``s.counts``; returns how many entries, and which of both vanishes (bits 1
+        and 2).
+    factor : callable
+        ``factor(r, t, q)``: its rate as a multiple of the kernel.
+    random : bool
+        Whether the outcome draws random numbers.
+    pairs : int
+        How many processes there are.
+    """
+    choose_process = make_choose_process(pairs)
 
     @piece
     def fire(s, w, windows, p, q):
@@ -218,6 +252,8 @@ def make_record(visit: Callable[..., Any]) -> Callable[..., Any]:
         t.scalars[2] = s.count[EVENTS]
         t.scalars[3] = s.clock[VOLUME]
         t.scalars[4] = visit(s, w, t, grid, p)
+        t.scalars[5] = s.clock[MASS_IN]
+        t.scalars[6] = s.clock[MASS_OUT]
         for r in range(s.events.shape[0]):
             t.events[r] = s.events[r]
 
@@ -225,7 +261,7 @@ def make_record(visit: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def make_loop(
-    pieces: Pieces, outcome: Callable[..., Any], factor: Callable[..., Any], random: bool = False
+    pieces: Pieces, next_event: Callable[..., Any], fire: Callable[..., Any]
 ) -> Callable[..., Any]:
     """Assemble and compile the loop.
 
@@ -233,14 +269,10 @@ def make_loop(
     ----------
     pieces : Pieces
         Of the method.
-    outcome : callable
-        ``outcome(r, i, j, s, p, q)``: writes what process `r` makes of the sizes `i` and `j` into
-        ``s.sizes`` and ``s.counts``; returns how many entries, and which of both vanishes (bits 1
-        and 2).
-    factor : callable
-        ``factor(r, t, q)``: its rate as a multiple of the kernel.
-    random : bool
-        Whether the outcome draws random numbers.
+    next_event : callable
+        As `make_next_event` returns it.
+    fire : callable
+        As `make_fire` returns it.
 
     Returns
     -------
@@ -249,8 +281,6 @@ def make_loop(
         whose code is not `DONE` and writes why it returned into `codes`.
     """
     view, prepare, double = pieces.view, pieces.prepare, pieces.double
-    next_event = make_next_event(pieces.draw)
-    fire = make_fire(pieces.pair, pieces.update, outcome, factor, random)
     record = make_record(pieces.visit)
 
     @cold_piece
@@ -262,6 +292,8 @@ def make_loop(
                     if not double(s, w):
                         return GROW
                     s.clock[VOLUME] *= 2.0
+                    s.clock[MASS_IN] *= 2.0
+                    s.clock[MASS_OUT] *= 2.0
                     s.count[DOUBLINGS] += 1
                     s.clock[EXTINCT] = math.nan
                 reason = prepare(s, w, p)
@@ -269,7 +301,7 @@ def make_loop(
                     return reason
                 if s.count[TRIALS] + s.count[EVENTS] >= stop:
                     return BUDGET
-                reason = next_event(s, w, windows, p)
+                reason = next_event(s, w, windows, p, q)
                 if reason != 0:
                     return reason
                 if s.count[PHASE] == DRAW:

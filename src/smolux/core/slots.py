@@ -44,6 +44,13 @@ def slot_of(size, bits):
     return (shift << bits) + (size >> shift)
 
 
+@piece
+def slot_top(slot, bits):
+    """Largest size in a slot."""
+    shift = max((slot >> bits) - 1, np.int64(0))
+    return (((slot - (shift << bits)) + 1) << shift) - 1
+
+
 @lru_cache(maxsize=32)
 def slot_edges(bits: int, octaves: int = 62) -> np.ndarray:
     """Edges of the slots of all sizes below ``2**octaves``; slot 0 is empty.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,10 @@ PAUSE = 16  # 1: return at every output time
 REPAIRS = 17  # rates found above their bound
 WORST_I = 18  # sizes of the latest such pair, or of a rate that is no rate
 WORST_J = 19
-COUNTS = 20
+KIND = 20  # of the pending event, see `smolux.core.beside`
+LONE = 21  # the single particle of the pending event, and its size
+LONE_SIZE = 22
+COUNTS = 23
 
 # Entries of State.clock.
 TIME = 0  # of the latest event
@@ -38,7 +41,11 @@ MAJORANT = 4  # bound of the rate over the sizes present
 FLOOR = 5  # least majorant, raised by repairs
 VALUE = 6  # the value that broke a bound
 EXCESS = 7  # sum of what follows
-CLOCKS = 8  # from here on, for each process: what repairs have added to the bounds of its factor
+MASS_IN = 8  # what sources have brought in, and what has left, in the volume of now
+MASS_OUT = 9
+CHANCE = 10  # the number that decides what becomes of a single particle
+RAISED = 11  # by which share the bounds of rates of single particles were found too low
+CLOCKS = 12  # from here on, for each process: what repairs have added to the bounds of its factor
 
 #: sizes stay below this, so that a sum of two cannot overflow
 LIMIT = 1 << 62
@@ -87,12 +94,45 @@ class Windows(NamedTuple):
         The last edge is infinite, or beyond every output time.
     bounds : float64 array of shape (W, P)
     total : float64 array of shape (W,)
-        Sum of the bounds.
+        Sum of the bounds over the processes of pairs.
+    ceiling : float64 array of shape (L, slots)
+        Bounds of the rates of single particles up to a size, for each process of them.
+    inflow : float64 array of shape (S,)
+        Simulated particles that each source brings in for a unit of volume and time.
+    size : int64 array of shape (S, K)
+    share : float64 array of shape (S, K)
+        Sizes that come in, and the share of those up to them.
+    cut : int64 array of shape (2,)
+        The largest size that stays, and the process that takes the others out.
     """
 
     edges: np.ndarray
     bounds: np.ndarray
     total: np.ndarray
+    ceiling: np.ndarray
+    inflow: np.ndarray
+    size: np.ndarray
+    share: np.ndarray
+    cut: np.ndarray
+
+
+class Parameters(NamedTuple):
+    """Parameters of the processes: a tuple for each, in the order of the processes.
+
+    Attributes
+    ----------
+    factors, outcomes : tuple
+        Of pairs: of the factors in time, and of what comes of an encounter.
+    lone, lone_factors : tuple
+        Of single particles: of the rates, and of the factors.
+    source_factors : tuple
+    """
+
+    factors: tuple[Any, ...]
+    outcomes: tuple[Any, ...]
+    lone: tuple[Any, ...]
+    lone_factors: tuple[Any, ...]
+    source_factors: tuple[Any, ...]
 
 
 class Tally(NamedTuple):
@@ -100,8 +140,8 @@ class Tally(NamedTuple):
 
     Attributes
     ----------
-    scalars : float64 array of shape (R, T, 5)
-        Time recorded, particles, collisions, volume, largest size.
+    scalars : float64 array of shape (R, T, 7)
+        Time recorded, particles, collisions, volume, largest size, mass that came in and left.
     events : int64 array of shape (R, T, P)
     counts : int64 array of shape (R, T, L + 1)
         Particles of the sizes ``1 .. L``; entry 0 is unused.
@@ -143,7 +183,7 @@ def new_tally(replicas: int, grid: Grid, sizes: int, processes: int) -> Tally:
     """Make room for observations; `scalars` is NaN where nothing is recorded yet."""
     shape = (replicas, len(grid.times))
     return Tally(
-        np.full((*shape, 5), np.nan),
+        np.full((*shape, 7), np.nan),
         np.zeros((*shape, processes), np.int64),
         np.zeros((*shape, sizes + 1), np.int64),
         np.zeros((*shape, len(grid.edges))),

@@ -118,6 +118,43 @@ def make_outcome(outcome: Callable[..., Any], weight: Callable[..., Any]) -> Cal
     return weighted
 
 
+def make_stands(weight: Callable[..., Any] | None) -> Callable[..., Any]:
+    """Bind ``stands(size, p)``: how many particles a simulated one stands for."""
+    if weight is None:
+
+        @piece
+        def one(size, p):
+            return 1.0
+
+        return one
+
+    @piece
+    def stands(size, p):
+        return 1.0 / weight(size, p)
+
+    return stands
+
+
+def make_replacement(weight: Callable[..., Any] | None) -> Callable[..., Any]:
+    """Bind the rounding of what appears in place of one particle, ``(s, entries, size, p)``."""
+    if weight is None:
+
+        @piece
+        def as_it_is(s, entries, size, p):
+            return entries
+
+        return as_it_is
+    rounded = make_rounding(weight)
+
+    @piece
+    def replaced(s, entries, size, p):
+        if entries == 0:
+            return np.int64(0)
+        return np.int64(rounded(s, entries, weight(size, p), p))
+
+    return replaced
+
+
 def make_tally(weight: Callable[..., Any]) -> Callable[..., Any]:
     """Bind the counting of particles that stand for ``1 / w``; see `smolux.core.loop.tally_one`."""
 

@@ -21,6 +21,7 @@ _TOLERANCES = 1e-12, 0.1
 _LIMIT, DIRECT_LIMIT = 1 << 20, 1 << 13
 #: where a gel forms, and where only other processes keep one from forming
 _GEL_LIMIT, _HINDERED_LIMIT = 1 << 12, 1 << 16
+_SMALLEST = 4
 #: at least so many times the largest size at the start
 _ROOM = 8
 
@@ -81,7 +82,7 @@ def check(
         )
     for what, most in (("largest", largest), ("max_size", max_size)):
         if most is not None:
-            _whole(what, most, 4, problems)
+            _whole(what, most, _SMALLEST, problems)
     if largest is not None and max_size is not None and largest != max_size:
         problems.append(
             f"largest = {largest!r} and max_size = {max_size!r}: the first fixes the number of "
@@ -111,13 +112,18 @@ def check(
         times=output,
         method=method,
         tolerance=float(tolerance),
-        limit=int(limit),
+        limit=min(int(limit), _beyond(model)),
         fixed=largest is not None,
         given=largest is not None or max_size is not None,
         orders=powers,
         gel=gel,
         **counts,
     )
+
+
+def _beyond(model: Model) -> int:
+    """Return the largest size that is ever there, if particles beyond a size leave."""
+    return 1 << 62 if model.cut is None else max(model.cut, _SMALLEST)
 
 
 def _default_limit(model: Model) -> int:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..model import Model
-from ..processes.base import PairProcess
+from ..processes.base import PairProcess, Process
+from .beside import Beside
 from .operator import Operator, OperatorFactory
 
 Float = NDArray[np.float64]
@@ -48,6 +49,8 @@ class Equations:
     ) -> None:
         self.model, self.mass, self._factory, self._gel_reacts = model, mass, factory, gel_reacts
         self._factors = [p.factor for p in model.processes]
+        self.pairs = [p for p in model.processes if isinstance(p, PairProcess)]
+        self._beside = Beside(model)
         self.evaluations = 0
         self.resize(largest)
 
@@ -58,9 +61,15 @@ class Equations:
         self.operator: Operator = self._factory(largest)
         self._bands = np.empty((largest, 0))
         self._gel = gel_affinity(self.model, self.sizes) if self._gel_reacts else None
+        self._beside.resize(self.sizes)
 
     @property
-    def processes(self) -> tuple[PairProcess, ...]:
+    def quantities(self) -> int:
+        """How many quantities `rates` gives to be integrated along."""
+        return len(self.processes) + (2 if self.model.open else 0)
+
+    @property
+    def processes(self) -> tuple[Process, ...]:
         """The processes of the model."""
         return tuple(self.model.processes)
 
@@ -75,8 +84,9 @@ class Equations:
         Returns
         -------
         rates : ndarray of shape (S, M)
-        collisions : ndarray of shape (S, P)
-            Collisions per unit volume and time that end in each process.
+        events : ndarray of shape (S, Q)
+            Events of each process per unit volume and time; if the system is open, the mass that
+            comes in and the mass that leaves, too.
         """
         self.evaluations += len(n)
         loss = n * self.operator.loss(n)
@@ -92,12 +102,17 @@ class Equations:
                 gains.append(self.operator.gain(n))
             return gains[0][s]
 
-        total, collisions = np.zeros_like(n), np.empty((len(n), len(self.processes)))
+        total, events = np.zeros_like(n), np.zeros((len(n), self.quantities))
         for s, t in enumerate(times):
-            for p, process in enumerate(self.processes):
+            for p, process in enumerate(self.pairs):
                 total[s] += process.rhs(float(t), self.sizes, n[s], loss[s], partial(gain, s))
-                collisions[s, p] = self._factor(p, float(t)) * pairs[s]
-        return total, collisions
+                events[s, p] = self._factor(p, float(t)) * pairs[s]
+            if len(self.pairs) < len(self.processes):
+                factors = [self._factor(p, float(t)) for p in range(len(self.processes))]
+                total[s] += self._beside.rates(factors, n[s], events[s])
+            if self.largest == self.model.cut:  # what would lie beyond the window leaves, too
+                events[s, -1] = events[s, -2] - float(total[s] @ self.sizes)
+        return total, events
 
     def _factor(self, p: int, t: float) -> float:
         factor = float(self._factors[p](t))
@@ -110,13 +125,15 @@ class Equations:
 
     def conserves(self, n: Float) -> bool:
         """Whether what happens within the window keeps its mass: a gel takes some of it."""
+        if self.model.open:
+            return False
         return self._gel is None or self.mass - float(n @ self.sizes) <= _NO_GEL * self.mass
 
     def shares(self, t: float) -> tuple[float, float]:
         """Return how often loss and gain enter the rates: ``1 + λ`` and 1 with shattering."""
         nothing, one = np.zeros(2), np.array([0.0, 1.0])
-        gain = sum(float(p.rhs(t, one, nothing, nothing, lambda: one)[1]) for p in self.processes)
-        return sum(self._factor(p, t) for p in range(len(self.processes))), gain
+        gain = sum(float(p.rhs(t, one, nothing, nothing, lambda: one)[1]) for p in self.pairs)
+        return sum(self._factor(p, t) for p in range(len(self.pairs))), gain
 
     def jacobian(self, t: float, n: Float, h: float) -> tuple[Float, Float]:
         """Return the stiff part: minus its diagonal, shape (M,), and J bands below, shape (M, J).
@@ -130,7 +147,13 @@ class Equations:
         near = self._near(n, _LEFT_OUT / max(loss * h, 1e-300))
         if self._gel is not None:
             near[0] += self._gel * (self.mass - float(n @ self.sizes))
-        return loss * near[0], gain * near[1]
+        return loss * near[0] + self.lone_losses(t), gain * near[1]
+
+    def lone_losses(self, t: float) -> Float:
+        """Return the rate at which a particle of each size vanishes by itself, shape (M,)."""
+        if len(self.pairs) == len(self.processes):
+            return np.zeros(self.largest)
+        return self._beside.losses([self._factor(p, t) for p in range(len(self.processes))])
 
     def _near(self, n: Float, enough: float) -> list[Float]:
         """Return the loss by near partners, together and each; `enough` of it may be missing."""

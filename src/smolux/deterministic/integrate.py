@@ -22,6 +22,8 @@ _AFTER_FAILURE = 0.4
 _CAREFUL_STEPS, _CAREFUL = 8, 1.15
 #: first step: so much may change
 _FIRST_CHANGE = 0.02
+#: what begins empty has no scale of its own: the share of the first output time that is skipped
+_ENTRY = 1e-9
 #: steps between two looks at how densities fall off
 _PREPARE = 4
 
@@ -77,8 +79,8 @@ class Integrator:
     ----------
     t : float
     n : ndarray of shape (M,)
-    collisions : ndarray of shape (P,)
-        Collisions per unit volume so far, by process.
+    collisions : ndarray of shape (Q,)
+        What is integrated along, see `Equations.rates`: events of each process per unit volume.
     steps, rejected : int
     corrected : float
         Sum of the relative corrections of the mass, see `_conserve`.
@@ -90,7 +92,7 @@ class Integrator:
         self.equations, self.n, self.window, self.tolerance = equations, n, window, tolerance
         self._orders = orders
         self.t = 0.0
-        self.collisions = np.zeros(len(equations.processes))
+        self.collisions = np.zeros(equations.quantities)
         self.steps = self.rejected = 0
         self.corrected = 0.0
         #: the estimate is of lower order than the step (Hairer and Wanner 1996, section IV.8)
@@ -110,7 +112,9 @@ class Integrator:
         SolverError
             If the step length falls to nothing, with the time reached.
         """
-        if self._h == 0.0:
+        if self._h == 0.0 and self.t < end:
+            if not self.n.any():
+                self._enter(end)
             self._h = self._first_step(end)
             self._smallest = 1e-12 * self._h
         while self.t < end:
@@ -124,6 +128,13 @@ class Integrator:
             if self._h < max(self._smallest, 1e-14 * self.t):
                 raise self._failure()
             stop()
+
+    def _enter(self, end: float) -> None:
+        """Go from no particles at all to the first ones, which do not meet yet."""
+        rates, along = self.equations.rates(np.array([self.t]), self.n[None, :])
+        self.t = _ENTRY * end
+        self.n, self.collisions = self.t * rates[0], self.collisions + self.t * along[0]
+        self._start = self._rates()
 
     def _first_step(self, end: float) -> float:
         change = self._norm(self._start, self.n)

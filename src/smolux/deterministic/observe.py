@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..processes.base import PairProcess, Process
 from ..records import Records
 
 Float = NDArray[np.float64]
@@ -21,8 +22,10 @@ class Snapshot:
     ----------
     window : int
         The number of sizes M.
+    mass : float
+        Mass in the window.
     mass_error : float
-        Relative difference of the mass in the window from that at the start.
+        Relative difference from that at the start, with what came in and without what left.
     negative : float
         The most negative density over the number density; zero if there is none.
     """
@@ -33,6 +36,7 @@ class Snapshot:
     number_density: float
     collisions: Float
     window: int
+    mass: float
     mass_error: float
     negative: float
 
@@ -47,10 +51,19 @@ class Observer:
     sizes, bins_per_octave : int
         Densities size by size up to `sizes`, in bins above.
     mass : float
-        Mass per unit volume of the whole system.
+        Mass per unit volume of the whole system at the start.
+    processes : sequence of Process
     """
 
-    def __init__(self, orders: Float, sizes: int, bins_per_octave: int, mass: float) -> None:
+    def __init__(
+        self,
+        orders: Float,
+        sizes: int,
+        bins_per_octave: int,
+        mass: float,
+        processes: Sequence[Process] = (),
+    ) -> None:
+        self.processes = processes
         self.orders, self.sizes, self.mass = orders, sizes, mass
         first = sizes + 1
         steps = np.arange(int((62 - np.log2(first)) * bins_per_octave) + 1)
@@ -63,6 +76,8 @@ class Observer:
         negative = float(min(n.min(), 0.0)) / total if total > 0 else 0.0
         n = np.maximum(n, 0.0)
         k = np.arange(1.0, len(n) + 1.0)
+        come, gone = collisions[len(self.processes) :] if self._open else (0.0, 0.0)
+        expected = self.mass + come - gone
         exact = np.zeros(self.sizes)
         exact[: min(self.sizes, len(n))] = n[: self.sizes]
         used = int(np.searchsorted(self.edges, len(n), side="right"))
@@ -74,14 +89,19 @@ class Observer:
             number_density=total,
             collisions=collisions.copy(),
             window=len(n),
-            mass_error=float(n @ k) / self.mass - 1.0,
+            mass=float(n @ k),
+            mass_error=float(n @ k) / expected - 1.0 if expected > 0.0 else 0.0,
             negative=negative,
         )
 
-    def records(
-        self, times: Sequence[float], processes: Sequence[str], shots: Sequence[Snapshot]
-    ) -> Records:
+    @property
+    def _open(self) -> bool:
+        return any(process.opens for process in self.processes)
+
+    def records(self, times: Sequence[float], shots: Sequence[Snapshot]) -> Records:
         """Return records of one replica; times without a snapshot are NaN."""
+        processes = self.processes
+        pairs = [k for k, p in enumerate(processes) if isinstance(p, PairProcess)]
         count = len(times)
         bins = max((len(s.n_bin) for s in shots), default=0)
 
@@ -91,7 +111,7 @@ class Observer:
         records = Records(
             times=np.array(times),
             orders=self.orders,
-            processes=tuple(processes),
+            processes=tuple(process.name for process in processes),
             bin_edges=np.append(self.edges.astype(float), 2.0**62)[: bins + 1],
             number_density=filled(),
             largest=filled(),
@@ -107,12 +127,18 @@ class Observer:
         records.volume[0, len(shots) :] = np.nan
         for t, shot in enumerate(shots):
             records.number_density[0, t] = shot.number_density
-            records.collisions[0, t] = shot.collisions.sum()
-            records.events[0, t] = shot.collisions
+            records.collisions[0, t] = shot.collisions[pairs].sum()
+            records.events[0, t] = shot.collisions[: len(processes)]
             records.moment[0, t] = shot.moment
             records.n[0, t] = shot.n
             records.n_bin[0, t] = 0.0
             records.n_bin[0, t, : len(shot.n_bin)] = shot.n_bin
+        if self._open:
+            inside, come, gone = filled(), filled(), filled()
+            for t, shot in enumerate(shots):
+                inside[0, t] = shot.mass
+                come[0, t], gone[0, t] = shot.collisions[len(processes) :]
+            records.balance = inside, come, gone
         records.attributes["mass_error"] = [s.mass_error for s in shots]
         records.attributes["window"] = [s.window for s in shots]
         return records

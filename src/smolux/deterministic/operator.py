@@ -181,7 +181,7 @@ class LowRank:
         The noise of size k is ``exp(-theta k) sum_j n_j^2 exp(2 theta j)`` up to a factor. Its
         effect on the moments relative to them is a convex function of theta in the logarithm.
         """
-        if n is None:
+        if n is None or not n.any():
             self._tilt(0.0)
             return
         theta, m = self._best_tilt(n), self.largest

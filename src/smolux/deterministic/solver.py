@@ -189,7 +189,9 @@ class _Run:
         n = model.initial.densities(max(sizes, start))
         mass = float(n @ np.arange(1.0, len(n) + 1.0))
         self.equations = Equations(model, self.factory, sizes, mass, settings.gel == "reacts")
-        self.observer = Observer(settings.orders, settings.sizes, settings.bins_per_octave, mass)
+        self.observer = Observer(
+            settings.orders, settings.sizes, settings.bins_per_octave, mass, model.processes
+        )
         self.integrator = Integrator(
             self.equations, n[:sizes], window, settings.tolerance, settings.orders
         )
@@ -221,8 +223,7 @@ class _Run:
 
     def records(self, seconds: float) -> Records:
         """Return what was observed so far."""
-        names = [p.name for p in self.model.processes]
-        records = self.observer.records(self.settings.times, names, self.shots)
+        records = self.observer.records(self.settings.times, self.shots)
         operator = self.equations.operator
         records.attributes |= {
             "method": "solve",

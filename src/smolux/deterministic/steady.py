@@ -89,7 +89,7 @@ class Linearisation:
         #: densities times these are of about the same size
         self.weight = self.sizes**2
         loss, gain = equations.shares(0.0)
-        frequency = loss * equations.operator.loss(n[None, :])[0]
+        frequency = loss * equations.operator.loss(n[None, :])[0] + equations.lone_losses(0.0)
         #: collisions per time, of a particle and of the mass
         self.scale = 2.0 * float(collisions.sum()) / float(n.sum())
         self.turnover = float((n * frequency) @ self.sizes)
@@ -194,6 +194,11 @@ def steady_state(
         raise InputError(
             "processes: with aggregation alone there is no steady state; add one that brings back "
             "small sizes, such as smolux.processes.Shattering(0.01)"
+        )
+    if model.open:
+        raise InputError(
+            "processes: with sources or removal no mass is given that a steady state could have; "
+            "solve up to a time when nothing changes any more"
         )
     start = model.initial.densities(model.initial.largest)
     mass = float(start @ np.arange(1.0, len(start) + 1.0))

@@ -85,6 +85,16 @@ def _pair(s, w):
 
 
 @piece
+def _lone(s, w, k):
+    return k, _size(s, w, k)
+
+
+@piece
+def _seize(s, w, place):
+    s.count[FIRST] = place
+
+
+@piece
 def _look_ahead(s, w, k):
     """Draw the pair of a later candidate and ask for its memory.
 
@@ -192,7 +202,7 @@ def _update(s, w, gone, entries, p):
 def _rescan(s, w):
     """Take the smallest and largest size afresh; the bound in force is then renewed."""
     s.count[SINCE] = 0
-    low = np.int64(1) if s.count[MONOMERS] > 0 else w.sizes[0]
+    low = np.int64(1) if s.count[MONOMERS] > 0 else max(w.sizes[0], np.int64(1))
     high = low
     for k in range(s.count[STORED]):
         low = min(low, w.sizes[k])
@@ -260,7 +270,9 @@ class AcceptanceRejection(Method):
     def bind(rate: Any, tally: Any) -> Pieces:
         """See `Method.bind`."""
         visit = _make_visit(tally)
-        return Pieces(_view, _make_draw(rate), _pair, _update, _prepare, _double, visit)
+        return Pieces(
+            _view, _make_draw(rate), _pair, _update, _prepare, _double, _lone, _seize, visit
+        )
 
     def new_work(
         self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int

@@ -9,9 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
-from ..processes.base import PairProcess
+from ..processes.base import PairProcess, Process
 from .acceptance_rejection import AcceptanceRejection
 from .base import Method, Rates
 from .low_rank import LowRank
@@ -49,7 +48,9 @@ def _start(mean: float, heavy: float) -> Float:
     excess = heavy / mean - 1.0
     if excess < 1e-9:
         return np.array([mean])
-    return np.maximum(special.gammaincinv(1.0 / excess, _SHARES) * mean * excess, 1.0)
+    # by a sample, which needs no special functions: these take longer to load than all of this
+    sample = np.random.default_rng(0).standard_gamma(1.0 / excess, 4096)
+    return np.asarray(np.maximum(np.quantile(sample, _SHARES) * mean * excess, 1.0))
 
 
 class _Grid:
@@ -175,6 +176,13 @@ def candidates_per_event(
         candidates = np.where(met > 0.0, np.maximum(bound / average, 1.0), 0.0)
     found = float(candidates @ met / met.sum())
     return found if math.isfinite(found) else math.inf
+
+
+def unforeseen(processes: Sequence[Process]) -> tuple[Method, str] | None:
+    """Choose for systems that the estimate does not cover: not for encounters alone."""
+    if all(isinstance(process, PairProcess) for process in processes):
+        return None
+    return SizeClass(), "particles come, go or change alone, and its cost depends least on sizes"
 
 
 def choose(

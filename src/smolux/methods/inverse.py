@@ -83,6 +83,23 @@ def _pair(s, w):
 
 
 @cold_piece
+def _lone(s, w, k):
+    left, slot = float(k), 0
+    while slot < w.table.shape[1]:
+        if left < w.number[slot]:
+            return np.int64(slot), np.int64(slot + 1)
+        left -= w.number[slot]
+        slot += 1
+    place = slot + np.int64(left)
+    return place, _size(w, place)
+
+
+@piece
+def _seize(s, w, place):
+    s.count[FIRST] = place
+
+
+@cold_piece
 def _first(s, w, small, x):
     """Slot of the first particle, by its rate with all others."""
     top, buckets = _top(s, w), w.table.shape[1]
@@ -387,6 +404,8 @@ class Inverse(Method):
             _make_update(pair_rate, row_of, own_rate, look),
             _make_prepare(own_rate, look),
             _double,
+            _lone,
+            _seize,
             _make_visit(tally),
         )
 

@@ -31,6 +31,8 @@ from .low_rank_store import (
 
 #: candidates looked at before the loop may return without an event
 _PATIENCE = 4096
+#: a particle is a number of this many bits within its slot, and the slot above them
+_PLACE_BITS = 44
 #: a rate above its majorant by no more than rounding breaks no bound
 _ROUNDING = 1.0 + 1e-12
 
@@ -130,6 +132,24 @@ def _pair_by_term(s, w, stage, total):
     # what is left of x is uniform below the weight of the term, and serves again
     w.chosen[0], w.chosen[1] = _choose(w, w.term[stage, k, 0], x / weight)
     w.chosen[2], w.chosen[3] = _choose(w, w.term[stage, k, 1], rng.uniform(s.rng))
+
+
+@cold_piece
+def lone(s, w, k):
+    """Place and size of particle `k`: the number in its slot, and the slot above these bits."""
+    left, slot = float(k), np.int64(1)
+    while left >= w.number[slot]:
+        left -= w.number[slot]
+        slot += 1
+    place = np.int64(left)
+    return (slot << _PLACE_BITS) | place, size_at(w, slot, place)
+
+
+@piece
+def seize(s, w, place):
+    """Put a particle in the place of the first of the pair."""
+    s.count[FIRST] = place >> _PLACE_BITS
+    w.chosen[0], w.chosen[1] = place >> _PLACE_BITS, place & ((1 << _PLACE_BITS) - 1)
 
 
 @piece

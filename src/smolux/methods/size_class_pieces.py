@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core import rng
 from ..core.alias import outcome
-from ..core.compile import piece
+from ..core.compile import cold_piece, piece
 from ..core.loop import Pieces, note_bad, repair
 from ..core.prefetch import prefetch
 from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, TRIALS, VOLUME
@@ -43,6 +43,20 @@ def _pair(s, w):
         size_at(w, a >> _SLOT_BITS, a & _SLOT),
         size_at(w, b >> _SLOT_BITS, b & _SLOT),
     )
+
+
+@cold_piece
+def _lone(s, w, k):
+    g = np.int64(1)
+    while k >= w.number[g]:
+        k -= w.number[g]
+        g += 1
+    return (g << _SLOT_BITS) | k, size_at(w, g, k)
+
+
+@piece
+def _seize(s, w, place):
+    s.count[FIRST] = place
 
 
 @piece
@@ -130,4 +144,5 @@ def _update(s, w, gone, entries, p):
 
 def bind(rate: Any, tally: Any) -> Pieces:
     """Bind the pieces to a rate and a way to count."""
-    return Pieces(view, _make_draw(rate), _pair, _update, prepare, double, make_visit(tally))
+    visit = make_visit(tally)
+    return Pieces(view, _make_draw(rate), _pair, _update, prepare, double, _lone, _seize, visit)

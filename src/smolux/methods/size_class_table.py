@@ -8,8 +8,9 @@ import numpy as np
 
 from ..core.alias import build
 from ..core.compile import cold_piece, piece
-from ..core.state import BOUND, MAJORANT, PARTICLES, SINCE
-from .size_class_store import AHEAD, BLOCK, CHUNK, NEXT, PAIRS, SHARE, SPAN, STALE
+from ..core.slots import slot_top
+from ..core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
+from .size_class_store import AHEAD, BITS, BLOCK, CHUNK, NEXT, PAIRS, SHARE, SPAN, STALE
 
 
 @cold_piece
@@ -90,6 +91,10 @@ def _renew(s, w):
         else:
             w.room[g] = w.before[g] = 0
     largest = w.queue[used - 1]
+    present = used - 1
+    while w.number[w.queue[present]] == 0 and present > 0:
+        present -= 1
+    s.count[LARGEST] = slot_top(np.int64(w.queue[present]), w.meta[BITS])
     if math.isnan(w.low[largest, largest]):
         return BOUND
     _give_room(s, w, used)

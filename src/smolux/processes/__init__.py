@@ -1,10 +1,32 @@
-"""What an encounter of two particles leads to: one file per mechanism."""
+"""What happens to particles, in pairs, alone, or from outside: one file per mechanism."""
 
 from .aggregation import Aggregation
-from .base import PairProcess
+from .base import LoneProcess, PairProcess, Process
+from .evaporation import Evaporation
+from .fragmentation import Fragmentation
+from .removal import Removal
 from .shattering import Shattering
+from .source import Source
 
 #: every process; the name in a case file is its ``name``
-PROCESSES: tuple[type[PairProcess], ...] = (Aggregation, Shattering)
+PROCESSES: tuple[type[Process], ...] = (
+    Aggregation,
+    Shattering,
+    Evaporation,
+    Fragmentation,
+    Removal,
+    Source,
+)
 
-__all__ = ["PROCESSES", "Aggregation", "PairProcess", "Shattering"]
+__all__ = [
+    "PROCESSES",
+    "Aggregation",
+    "Evaporation",
+    "Fragmentation",
+    "LoneProcess",
+    "PairProcess",
+    "Process",
+    "Removal",
+    "Shattering",
+    "Source",
+]

@@ -1,4 +1,4 @@
-"""What every process has: how often an encounter ends in it, and what then appears."""
+"""What every process has: how often it takes place, and what then vanishes and appears."""
 
 from __future__ import annotations
 
@@ -15,10 +15,8 @@ Float = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class PairProcess:
-    """What an encounter of two particles leads to, at ``factor(t)`` times the rate of the kernel.
-
-    Both particles vanish; `outcome` names what appears in their place.
+class Process:
+    """Something that changes the population; see `PairProcess`, `LoneProcess` and `Source`.
 
     Attributes
     ----------
@@ -27,17 +25,42 @@ class PairProcess:
     """
 
     name: ClassVar[str]
-    #: the most (size, count) entries one outcome writes
-    entries: ClassVar[int] = 1
+    #: order among the processes of a model: pairs, single particles, sources
+    kind: ClassVar[int]
+    #: whether it takes mass in or out
+    opens: ClassVar[bool] = False
+
+    @property
+    def entries(self) -> int:
+        """The most (size, count) entries that one event writes."""
+        return 1
+
+    @property
+    def factor(self) -> TimeFunction:
+        """A function of time that multiplies the rate."""
+        return TimeFunction.of(1.0)
+
+
+@dataclass(frozen=True)
+class PairProcess(Process):
+    """What an encounter of two particles leads to, at ``factor(t)`` times the rate of the kernel.
+
+    Both particles vanish; `outcome` names what appears in their place.
+    """
+
+    kind: ClassVar[int] = 0
 
     #: ``outcome(i, j, sizes, counts) -> int``: plain Python that Numba can compile. Writes what
     #: appears into the two int64 arrays and returns the number of entries written.
     outcome: ClassVar[Callable[..., Any]]
+    #: whether `outcome` takes ``uniform`` first, and then, after the arrays, what that takes: a
+    #: function that returns a random number
+    random: ClassVar[bool] = False
 
     @property
-    def factor(self) -> TimeFunction:
-        """The rate as a multiple of the kernel, a function of time."""
-        return TimeFunction.of(1.0)
+    def parameters(self) -> tuple[Any, ...]:
+        """What `outcome` takes last."""
+        return ()
 
     def rhs(
         self, t: float, sizes: Float, n: Float, loss: Float, gain: Callable[[], Float]
@@ -55,4 +78,44 @@ class PairProcess:
         gain : callable
             Returns ``sum_{i+j=k} K(i, j) n_i n_j / 2`` for ``k = 1 .. M``; computed only if called.
         """
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class LoneProcess(Process):
+    """What happens to a particle by itself, at a rate that depends on its size.
+
+    The rate may also depend on a number u, uniform in [0, 1), that decides between outcomes: its
+    mean over u is the rate of the size. The particle vanishes; `outcome` names what appears.
+    """
+
+    kind: ClassVar[int] = 1
+    #: the smallest size to which it happens
+    least: ClassVar[int] = 1
+
+    #: ``outcome(k, u, sizes, counts) -> int``: as that of a `PairProcess`
+    outcome: ClassVar[Callable[..., Any]]
+    #: whether `law` is that of a pair of fragments, ``F(i, k - i)``, of which u chooses one
+    splits: ClassVar[bool] = False
+
+    @property
+    def law(self) -> Callable[..., Any]:
+        """``law(k, *parameters)``, the rate, or ``law(i, j, *parameters)`` if it `splits`."""
+        raise NotImplementedError
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        """What `law` takes last."""
+        raise NotImplementedError
+
+    def ceiling(self, low: Float, high: Float) -> Float:
+        """Upper bounds of the rate, for every u, over ranges of sizes."""
+        raise NotImplementedError
+
+    def rates(self, sizes: Float) -> Float:
+        """Rate of a particle of each of the sizes ``1 .. M``."""
+        raise NotImplementedError
+
+    def gain(self, sizes: Float, n: Float, lost: Float) -> Float:
+        """Return what appears per time in each size, when of `n` so much vanishes."""
         raise NotImplementedError

@@ -1,0 +1,424 @@
+"""Events beside encounters: of single particles, and particles that come in.
+
+Three streams superpose, and the earliest event is the next one; after it all are drawn afresh,
+which changes nothing, as waiting times have no memory.
+
+- Encounters, drawn by the method.
+- Single particles: one with equal chance, thinned by its rate over the greatest one of the sizes
+  present. Rates are bounded for ranges of sizes, see `smolux.core.slots`.
+- Sources, each at a constant rate for a unit of volume.
+
+Time-dependent factors are bounded in windows and thinned when the event comes, as for encounters.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import rng
+from .compile import cold_piece, piece, user_piece
+from .loop import make_choose_process, note_bad
+from .slots import slot_of
+from .state import (
+    BAD_FACTOR,
+    BAD_RATE,
+    CHANCE,
+    CLOCKS,
+    DRAW,
+    EVENTS,
+    FIRE,
+    FIRST,
+    GROW,
+    KIND,
+    LARGEST,
+    LIMIT,
+    LONE,
+    LONE_SIZE,
+    MASS_IN,
+    MASS_OUT,
+    PARTICLES,
+    PENDING,
+    PHASE,
+    PROCESS,
+    RAISED,
+    REPAIRS,
+    SINCE,
+    TIME,
+    TOO_LARGE,
+    TRIALS,
+    VALUE,
+    VOLUME,
+    WINDOW,
+    WORST_I,
+    WORST_J,
+)
+
+#: classes an octave in which the rates of single particles are bounded, as a power of two
+CEILING_BITS = 3
+#: candidates looked at before the loop may return without an event
+_PATIENCE = 4096
+_ROUNDING = 1.0 + 1e-12
+
+PAIR, ALONE, SOURCE = 0, 1, 2
+
+
+class Lone(NamedTuple):
+    """A process of single particles, plain; see `smolux.processes.base.LoneProcess`."""
+
+    law: Callable[..., Any]
+    outcome: Callable[..., Any]
+    least: int
+    splits: bool
+    removes: bool
+
+
+def _bind_rate(process: Lone) -> Any:
+    """Rate ``(size, u, parameters)`` of one process."""
+    law, least = user_piece(process.law), process.least
+    if process.splits:
+
+        @cold_piece
+        def split(size, u, q):
+            if size < 2:
+                return 0.0
+            i = np.int64(1) + np.int64(u * (size - 1))
+            return 0.5 * float(size - 1) * float(law(float(i), float(size - i), *q))
+
+        return split
+
+    @cold_piece
+    def rate(size, u, q):
+        return float(law(float(size), *q)) if size >= least else 0.0
+
+    return rate
+
+
+def bind_rates(processes: Sequence[Lone]) -> Any:
+    """Bind ``rate(r, size, u, q)`` of all processes of single particles; 0 without any."""
+    if not processes:
+
+        @piece
+        def none(r, size, u, q):
+            return 0.0
+
+        return none
+    first = _bind_rate(processes[0])
+    if len(processes) == 1:
+
+        @piece
+        def last(r, size, u, q):
+            return first(size, u, q[0])
+
+        return last
+    others = bind_rates(processes[1:])
+
+    @piece
+    def rate(r, size, u, q):
+        if r == 0:
+            return first(size, u, q[0])
+        return others(r - 1, size, u, q[1:])
+
+    return rate
+
+
+def bind_outcomes(processes: Sequence[Lone]) -> Any:
+    """Bind ``outcome(r, size, u, s)``, and whether mass leaves by it."""
+    if not processes:
+
+        @piece
+        def none(r, size, u, s):
+            return 0, False
+
+        return none
+    first, removes = piece(processes[0].outcome), processes[0].removes
+    if len(processes) == 1:
+
+        @piece
+        def last(r, size, u, s):
+            return first(size, u, s.sizes, s.counts), removes
+
+        return last
+    others = bind_outcomes(processes[1:])
+
+    @piece
+    def outcome(r, size, u, s):
+        if r == 0:
+            return first(size, u, s.sizes, s.counts), removes
+        return others(r - 1, size, u, s)
+
+    return outcome
+
+
+def make_lone(lone: Callable[..., Any], rate: Callable[..., Any], pairs: int, count: int) -> Any:
+    """Bind the drawing of the next event of a single particle: the waiting time, NaN if no rate."""
+
+    @cold_piece
+    def note(s, size, value):
+        note_bad(s, size, np.int64(0), value)
+
+    @cold_piece
+    def repair(s, size, factor):
+        s.count[REPAIRS] += 1
+        s.count[WORST_I], s.count[WORST_J] = size, 0
+        s.clock[RAISED] = max(s.clock[RAISED], 1.1 * factor - 1.0)
+
+    @piece
+    def factor_bound(s, windows, r):
+        k = pairs + r
+        return windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
+
+    @cold_piece
+    def draw_lone(s, w, windows, q):
+        s.count[LONE] = -1
+        n = s.count[PARTICLES]
+        if n == 0:
+            return math.inf
+        slot = slot_of(s.count[LARGEST], np.int64(CEILING_BITS))
+        most = 0.0
+        for r in range(count):
+            most += factor_bound(s, windows, r) * windows.ceiling[r, slot]
+        most *= 1.0 + s.clock[RAISED]
+        if not most < math.inf:
+            note(s, s.count[LARGEST], most)
+            return math.nan
+        if most <= 0.0:
+            return math.inf
+        wait = 0.0
+        for _ in range(_PATIENCE):
+            s.count[TRIALS] += 1
+            wait += rng.exponential(s.rng)
+            one, size = lone(s, w, rng.below(s.rng, n))
+            u = rng.uniform(s.rng)
+            total = 0.0
+            for r in range(count):
+                value = rate(r, size, u, q.lone)
+                if not 0.0 <= value < math.inf:
+                    note(s, size, value)
+                    return math.nan
+                total += factor_bound(s, windows, r) * value
+            if total > most * _ROUNDING:
+                repair(s, size, total / most * (1.0 + s.clock[RAISED]))
+            if rng.uniform(s.rng) * most < total:
+                s.count[LONE], s.count[LONE_SIZE] = one, size
+                s.clock[CHANCE] = u
+                break
+        return wait / (float(n) * most)
+
+    return draw_lone
+
+
+def make_next_event(draw: Any, lone: Any, seize: Any, pairs: int, lones: int, sources: int) -> Any:
+    """Bind the drawing of the next event, of whatever kind; see `smolux.core.loop`."""
+
+    @cold_piece
+    def source_rate(s, windows):
+        total = 0.0
+        for r in range(sources):
+            k = pairs + lones + r
+            bound = windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
+            total += bound * windows.inflow[r]
+        return total * s.clock[VOLUME]
+
+    @piece
+    def next_event(s, w, windows, p, q):
+        window = s.count[WINDOW]
+        s.count[KIND] = PAIR
+        s.count[FIRST] = -1
+        wait = math.inf
+        if pairs > 0:
+            total = windows.total[window]
+            for r in range(pairs):
+                total += s.clock[CLOCKS + r]
+            if total > 0.0:
+                wait = draw(s, w, p, total)
+            if math.isnan(wait):
+                return BAD_RATE
+        if lones > 0:
+            alone = lone(s, w, windows, q)
+            if math.isnan(alone):
+                return BAD_RATE
+            if alone < wait:
+                wait = alone
+                s.count[KIND] = ALONE
+                seize(s, w, s.count[LONE])
+        if sources > 0:
+            rate = source_rate(s, windows)
+            if rate > 0.0:
+                come = rng.exponential(s.rng) / rate
+                if come < wait:
+                    wait = come
+                    s.count[KIND] = SOURCE
+        pending = s.clock[TIME] + wait
+        if pending >= windows.edges[window + 1] and windows.edges[window + 1] < math.inf:
+            s.clock[TIME] = windows.edges[window + 1]
+            s.count[WINDOW] = window + 1
+            return 0
+        s.clock[PENDING] = pending
+        s.count[PROCESS] = -1
+        s.count[PHASE] = FIRE
+        return 0
+
+    return next_event
+
+
+def make_choice(rate: Any, lone_factor: Any, source_factor: Any, pairs: int, lones: int,
+                sources: int) -> Any:  # fmt: skip
+    """Bind the choice of the process of an event that is no encounter, or none (-1)."""
+
+    @cold_piece
+    def kept(s, windows, r, value, share):
+        """Thin by the true factor; `share` is uniform below its bound."""
+        bound = windows.bounds[s.count[WINDOW], r] + s.clock[CLOCKS + r]
+        if not 0.0 <= value <= bound * _ROUNDING:
+            s.clock[VALUE] = value
+            s.count[PROCESS] = r
+            return -2 if not 0.0 <= value < math.inf else -3
+        return r if share < value else -1
+
+    @cold_piece
+    def choose_alone(s, windows, q):
+        total, size, u = 0.0, s.count[LONE_SIZE], s.clock[CHANCE]
+        for r in range(lones):
+            k = pairs + r
+            bound = windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
+            total += bound * rate(r, size, u, q.lone)
+        x = rng.uniform(s.rng) * total
+        r, value, bound = 0, 0.0, 0.0
+        for m in range(lones):
+            k = pairs + m
+            r, bound = m, windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
+            value = rate(m, size, u, q.lone)
+            if x < bound * value or m == lones - 1:
+                break
+            x -= bound * value
+        share = x / value if value > 0.0 else bound
+        return kept(s, windows, pairs + r, lone_factor(r, s.clock[PENDING], q.lone_factors), share)
+
+    @cold_piece
+    def choose_source(s, windows, q):
+        total = 0.0
+        first = pairs + lones
+        for r in range(sources):
+            bound = windows.bounds[s.count[WINDOW], first + r] + s.clock[CLOCKS + first + r]
+            total += bound * windows.inflow[r]
+        x = rng.uniform(s.rng) * total
+        r, bound = 0, 0.0
+        for m in range(sources):
+            r, bound = m, windows.bounds[s.count[WINDOW], first + m] + s.clock[CLOCKS + first + m]
+            if x < bound * windows.inflow[m] or m == sources - 1:
+                break
+            x -= bound * windows.inflow[m]
+        share = x / windows.inflow[r]
+        value = source_factor(r, s.clock[PENDING], q.source_factors)
+        return kept(s, windows, first + r, value, share)
+
+    @piece
+    def choose(s, windows, q):
+        if s.count[KIND] == ALONE:
+            return choose_alone(s, windows, q) if lones > 0 else -1
+        return choose_source(s, windows, q) if sources > 0 else -1
+
+    return choose
+
+
+def make_fire(
+    pieces: Any,
+    pair_outcome: Any,
+    factor: Any,
+    lone_outcome: Any,
+    choose: Any,
+    stands: Any,
+    rounded: Any,
+    pairs: int,
+    lones: int,
+) -> Any:
+    """Bind what happens when the pending event comes; see `smolux.core.loop.make_fire`.
+
+    `stands` is ``stands(size, p)``, how many particles a simulated one stands for; `rounded` rounds
+    what appears, ``rounded(s, entries, size, p)``, when a particle of one size is replaced.
+    """
+    choose_pair = make_choose_process(pairs)
+    pair, update = pieces.pair, pieces.update
+
+    @cold_piece
+    def pick(s, windows, r):
+        """Size of a particle that comes in."""
+        k = r - pairs - lones
+        x = rng.uniform(s.rng)
+        m = 0
+        while m < windows.share.shape[1] - 1 and x >= windows.share[k, m]:
+            m += 1
+        return windows.size[k, m]
+
+    @cold_piece
+    def cut_off(s, windows, entries, p):
+        """Take out what appears beyond the limit; return how many entries are left."""
+        kept = 0
+        for e in range(entries):
+            if s.sizes[e] > windows.cut[0]:
+                s.clock[MASS_OUT] += float(s.sizes[e]) * s.counts[e] * stands(s.sizes[e], p)
+                s.events[windows.cut[1]] += s.counts[e]
+            else:
+                s.sizes[kept], s.counts[kept] = s.sizes[e], s.counts[e]
+                kept += 1
+        return kept
+
+    @cold_piece
+    def result(s, w, windows, r, p, q):
+        """Write what appears; how many entries, what vanishes, mass that comes in and goes out."""
+        if s.count[KIND] == PAIR:
+            i, j = pair(s, w)
+            entries, gone = pair_outcome(r, i, j, s, p, q)
+            return entries, gone, 0.0, 0.0
+        if s.count[KIND] == ALONE:
+            size = s.count[LONE_SIZE]
+            entries, removes = lone_outcome(r - pairs, size, s.clock[CHANCE], s)
+            entries = rounded(s, entries, size, p)
+            return entries, 1, 0.0, float(size) * stands(size, p) if removes else 0.0
+        size = pick(s, windows, r)
+        s.sizes[0], s.counts[0] = size, 1
+        return 1, 0, float(size) * stands(size, p), 0.0
+
+    @piece
+    def fire(s, w, windows, p, q):
+        kind = s.count[KIND]
+        alive = s.count[FIRST] >= 0 if kind == PAIR else s.count[LONE] >= 0 or kind == SOURCE
+        if alive:
+            r = s.count[PROCESS]
+            if r < 0:
+                r = choose_pair(s, windows, factor, q) if kind == PAIR else choose(s, windows, q)
+                if r <= -2:
+                    return BAD_FACTOR
+                s.count[PROCESS] = r
+            if r >= 0:
+                a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
+                entries, gone, come, left = result(s, w, windows, r, p, q)
+                highest = np.int64(0)
+                for e in range(entries):
+                    highest = max(highest, s.sizes[e])
+                if highest >= LIMIT:
+                    return TOO_LARGE
+                out, cut = s.clock[MASS_OUT], s.events[windows.cut[1]]
+                if highest > windows.cut[0]:
+                    entries = cut_off(s, windows, entries, p)
+                if not update(s, w, gone, entries, p):
+                    s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
+                    s.clock[MASS_OUT], s.events[windows.cut[1]] = out, cut
+                    return GROW
+                for e in range(entries):
+                    s.count[LARGEST] = max(s.count[LARGEST], s.sizes[e])
+                s.clock[MASS_IN] += come
+                s.clock[MASS_OUT] += left
+                s.events[r] += 1
+                s.count[SINCE] += 1
+                if kind == PAIR:
+                    s.count[EVENTS] += 1
+        s.clock[TIME] = s.clock[PENDING]
+        s.count[PHASE] = DRAW
+        return 0
+
+    return fire

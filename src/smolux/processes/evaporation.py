@@ -1,0 +1,134 @@
+"""A particle loses a monomer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..errors import InputError
+from ..sizefunction import SizeFunction
+from ..timefunction import TimeFunction
+from .base import Float, LoneProcess
+
+
+def _evaporate(k: int, u: float, sizes: Any, counts: Any) -> int:
+    if k == 2:
+        sizes[0], counts[0] = 1, 2
+        return 1
+    sizes[0], counts[0] = k - 1, 1
+    sizes[1], counts[1] = 1, 1
+    return 2
+
+
+@dataclass(frozen=True)
+class Evaporation(LoneProcess):
+    """Particles lose monomers: ``(k) -> (k - 1) + (1)`` at the rate ``E_k``, for k from 2 on.
+
+    ``dn_k/dt = E_{k+1} n_{k+1} - E_k n_k`` for k > 1, and
+    ``dn_1/dt = E_2 n_2 + sum_{k>1} E_k n_k``.
+
+    Parameters
+    ----------
+    rate : float, str, callable or sequence of float
+        ``E_k``: a number, a formula in k such as ``"k**(2/3)"``, a function of the size, or the
+        values for k = 1, 2, ... (of which the first is not used, and the last holds beyond).
+    varying : float, callable or str
+        A function of time by which the rate is multiplied.
+
+    References
+    ----------
+    A. Kolodko and K. Sabelfeld, WIAS Preprint 842 (2003), eq. (15); R. Becker and W. Döring, Ann.
+    Phys. 416, 719 (1935), doi:10.1002/andp.19354160806.
+    """
+
+    rate: Any
+    varying: Any = 1.0
+    name: ClassVar[str] = "evaporation"
+    least: ClassVar[int] = 2
+    outcome: ClassVar[Callable[..., Any]] = staticmethod(_evaporate)
+    #: what the fields are functions of, beside plain numbers
+    variables: ClassVar[Mapping[str, str]] = {"rate": "k", "varying": "t"}
+
+    def __post_init__(self) -> None:
+        TimeFunction.of(self.varying, "evaporation: varying")
+        _ = self.of_size
+
+    @cached_property
+    def of_size(self) -> SizeFunction:
+        """The rate as a function of the size."""
+        return SizeFunction.of(self.rate, "the evaporation rate")
+
+    @property
+    def entries(self) -> int:
+        """See `Process.entries`."""
+        return 2
+
+    @property
+    def factor(self) -> TimeFunction:
+        """See `Process.factor`."""
+        return TimeFunction.of(self.varying, "evaporation: varying")
+
+    @property
+    def law(self) -> Callable[..., Any]:
+        """See `LoneProcess.law`."""
+        return self.of_size.rate
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        """See `LoneProcess.parameters`."""
+        return self.of_size.parameters
+
+    def ceiling(self, low: Float, high: Float) -> Float:
+        """See `LoneProcess.ceiling`."""
+        bound = self.of_size.bounds(np.maximum(low, 2.0), np.maximum(high, 2.0))[1]
+        return np.where(high >= 2.0, bound, 0.0)
+
+    def rates(self, sizes: Float) -> Float:
+        """See `LoneProcess.rates`."""
+        return np.where(sizes > 1.0, self.of_size(sizes), 0.0)
+
+    def gain(self, sizes: Float, n: Float, lost: Float) -> Float:
+        """See `LoneProcess.gain`."""
+        made = np.append(lost[1:], 0.0)
+        made[0] += lost[1:].sum()
+        return made
+
+    @classmethod
+    def free_molecular(
+        cls, ratio: float, steepness: float, *, printed: bool = False
+    ) -> Evaporation:
+        """Make the rates of small drops in the free-molecular regime, dimensionless.
+
+        For a kernel scaled so that ``K(1, 1) = 1``, monomers of unit density at the start and time
+        in units of their mean collision time:
+        ``E_k = ratio (K(1, k) / K(1, 2)) exp(steepness (k**(2/3) - (k-1)**(2/3) - 2**(2/3) + 1))``.
+
+        Parameters
+        ----------
+        ratio : float
+            β, the rate ``E_2`` times the collision time.
+        steepness : float
+            A, the surface energy of a monomer over the thermal energy.
+        printed : bool
+            Leave out the ratio of the kernels, as eq. (18) of the paper does; see the errata.
+
+        References
+        ----------
+        A. Kolodko and K. Sabelfeld, WIAS Preprint 842 (2003), eqs. (15) to (18).
+        """
+        problems = [
+            f"{name} = {value!r}: must be a finite number, zero or more"
+            for name, value in (("ratio", ratio), ("steepness", steepness))
+            if isinstance(value, bool)
+            or not isinstance(value, (int, float, np.number))
+            or not 0.0 <= value < np.inf
+        ]
+        if problems:
+            raise InputError(problems)
+        energy = f"exp({steepness!r} * (k**(2/3) - (k - 1)**(2/3) - 2**(2/3) + 1))"
+        kernel = "(1 + cbrt(k))**2 * sqrt(1 + 1/k) / ((1 + cbrt(2))**2 * sqrt(1.5))"
+        return cls(f"{ratio!r} * {energy}" if printed else f"{ratio!r} * {kernel} * {energy}")

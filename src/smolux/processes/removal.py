@@ -1,0 +1,103 @@
+"""Particles are taken out of the system."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..errors import InputError
+from ..sizefunction import SizeFunction
+from ..timefunction import TimeFunction
+from .base import Float, LoneProcess
+
+
+def _vanish(k: int, u: float, sizes: Any, counts: Any) -> int:
+    return 0
+
+
+@dataclass(frozen=True)
+class Removal(LoneProcess):
+    """Particles leave the system: ``(k) -> nothing``, at a rate or as soon as they are too large.
+
+    Parameters
+    ----------
+    rate : float, str, callable or sequence of float
+        Rate for each size: a number, a formula in k, a function of the size, or the values for
+        k = 1, 2, ... (the last one holds beyond).
+    above : int, optional
+        Particles of sizes above this leave at once.
+    varying : float, callable or str
+        A function of time by which the rate is multiplied.
+    """
+
+    rate: Any = 0.0
+    above: int | None = None
+    varying: Any = 1.0
+    name: ClassVar[str] = "removal"
+    opens: ClassVar[bool] = True
+    outcome: ClassVar[Callable[..., Any]] = staticmethod(_vanish)
+    variables: ClassVar[Mapping[str, str]] = {"rate": "k", "varying": "t"}
+
+    def __post_init__(self) -> None:
+        problems = []
+        for make in (
+            lambda: TimeFunction.of(self.varying, "removal: varying"),
+            lambda: self.of_size,
+        ):
+            try:
+                make()
+            except InputError as error:
+                problems += error.problems
+        if self.above is not None:
+            whole = not isinstance(self.above, bool) and isinstance(
+                self.above, (int, float, np.number)
+            )
+            if not (whole and 1 <= self.above < 2**62 and float(self.above).is_integer()):
+                problems.append(
+                    f"removal: above = {self.above!r}: must be a whole number of at least 1"
+                )
+            else:
+                object.__setattr__(self, "above", int(self.above))
+        elif not problems and self.of_size.constant == 0.0:
+            problems.append(
+                "removal: nothing would be removed: give a rate, or the size above which particles "
+                "leave, as in Removal(above=1000)"
+            )
+        if problems:
+            raise InputError(problems)
+
+    @cached_property
+    def of_size(self) -> SizeFunction:
+        """The rate as a function of the size."""
+        return SizeFunction.of(self.rate, "the removal rate")
+
+    @property
+    def factor(self) -> TimeFunction:
+        """See `Process.factor`."""
+        return TimeFunction.of(self.varying, "removal: varying")
+
+    @property
+    def law(self) -> Callable[..., Any]:
+        """See `LoneProcess.law`."""
+        return self.of_size.rate
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        """See `LoneProcess.parameters`."""
+        return self.of_size.parameters
+
+    def ceiling(self, low: Float, high: Float) -> Float:
+        """See `LoneProcess.ceiling`."""
+        return self.of_size.bounds(low, high)[1]
+
+    def rates(self, sizes: Float) -> Float:
+        """See `LoneProcess.rates`."""
+        return self.of_size(sizes)
+
+    def gain(self, sizes: Float, n: Float, lost: Float) -> Float:
+        """See `LoneProcess.gain`."""
+        return np.zeros(len(sizes))

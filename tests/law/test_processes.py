@@ -1,0 +1,254 @@
+"""Processes beside encounters: against exact solutions, reference values and each other.
+
+Evaporation with every weighting and method is in `test_weightings`. Here one compiled loop holds
+all the others; what is not wanted has a rate of next to nothing.
+"""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import laws
+import numpy as np
+import pytest
+from scipy import integrate
+
+import smolux as sx
+from smolux import case as cases
+from smolux.deterministic import steady_state
+from smolux.errors import InputError
+from smolux.model_dict import model_from_dict, model_to_dict
+
+DATA = Path(__file__).parent.parent / "reference" / "data"
+P = sx.processes
+FREE_MOLECULAR = sx.kernels.Ballistic(scale=1 / (4 * np.sqrt(2)))
+
+
+def everything(
+    evaporation: float = 0.0, fragmentation: float = 1e-300, removal: float = 0.0,
+    above: int = 10**9, source: float = 1e-300, initial: Any = None,
+) -> sx.Model:  # fmt: skip
+    """Make a model of all processes but shattering, those of which the rate varies among them."""
+    processes = [
+        P.Source({1: source, 3: 0.2 * source}, varying="1 + 0.5 * sin(3 * t)"),
+        P.Removal(removal, above=above),
+        P.Fragmentation(fragmentation),
+        P.Evaporation(evaporation, varying="1 + sin(5 * t)"),
+        P.Aggregation(),
+    ]
+    return sx.Model(laws.kernel("constant"), processes, initial or sx.initial.monodisperse())
+
+
+def simulated(model: sx.Model, times: Any, seed: int, **settings: Any) -> Any:
+    given = {"method": "acceptance-rejection", "particles": 1000, "replicas": 24} | settings
+    return sx.simulate(model, times, seed=seed, sizes=8, **given)
+
+
+def observed(ds: Any, t: float, sizes: slice) -> float:
+    return float(ds["n"].sel(time=t).isel(replica=0, size=sizes).sum())
+
+
+# --- simulation against the solver, and the balance of mass ---------------------------------------
+
+CASES = {
+    "evaporation": {"evaporation": 0.5},
+    "fragmentation": {"fragmentation": 0.2},
+    "removal": {"removal": 0.3},
+    "source": {"source": 1.0, "initial": sx.initial.empty()},
+    "source and sink": {"source": 1.0, "above": 20, "initial": sx.initial.empty()},
+    "all": {"evaporation": 0.5, "fragmentation": 0.2, "removal": 0.1, "above": 50, "source": 1.0},
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_simulation_and_solver(case: str) -> None:
+    model, times = everything(**CASES[case]), [0.7, 3.0]
+    assert [p.name for p in model.processes] == [
+        "aggregation", "removal", "fragmentation", "evaporation", "source"
+    ]  # fmt: skip
+    ds, truth = simulated(model, times, 41), sx.solve(model, times)
+    for order in (0, 1, 2):
+        values, expected = (x["moment"].sel(order=order).values for x in (ds, truth))
+        if order == 1 and values.std() < 1e-12:
+            np.testing.assert_allclose(values, np.broadcast_to(expected, values.shape), rtol=1e-8)
+            continue
+        laws.agree(values, expected[0], (case, order))
+    for size in (1, 2, 5):
+        laws.agree(ds["n"].sel(size=size).values, truth["n"].sel(size=size).values[0], size)
+    # events of each process, where the volume stays the same
+    if float(ds["volume"].max()) == float(ds["volume"].min()):
+        found = ds["events"].values / ds["volume"].values[..., None]
+        seen = found.std(axis=0).min(axis=0) > 0
+        seen[1] &= "above" not in CASES[case]  # the solver does not count what passes the limit
+        laws.agree(found[..., seen], truth["events"].values[0][:, seen], "events")
+        for name in ("mass_in", "mass_out"):
+            gone = (ds[name] / ds["volume"]).values[:, 1]
+            if gone.std() > 0:
+                laws.agree(gone, truth[name].values[0, 1], name)
+    total = ds["mass"] - ds["mass_in"] + ds["mass_out"]
+    start = 0 if "initial" in CASES[case] else 1000
+    np.testing.assert_array_equal(total, start * ds["volume"] / ds["volume"][0, 0].item())
+    np.testing.assert_array_equal(ds["mass"], np.rint(ds["mass"]))
+    balance = truth["mass"] - truth["mass_in"] + truth["mass_out"]
+    np.testing.assert_allclose(balance, start / 1000, atol=1e-7)
+    assert ds.attrs["warnings"] == "[]"
+    assert np.isnan(ds["extinction_time"]).all()
+
+
+def test_trajectories_do_not_depend_on_the_output_times() -> None:
+    model = everything(**CASES["all"])
+    few, many = (simulated(model, times, 42, replicas=3, particles=200) for times in
+                 ([2.0], [0.01, 0.5, 1.1, 2.0]))  # fmt: skip
+    for name in ("n", "events", "mass", "mass_in", "mass_out", "volume"):
+        np.testing.assert_array_equal(few[name].sel(time=2.0), many[name].sel(time=2.0))
+
+
+def test_nothing_is_left() -> None:
+    """Removal alone: each of the particles vanishes by itself, and nothing comes after the last."""
+    ds = simulated(
+        everything(removal=1.0), [1.0, 40.0], 43, particles=50, replicas=200,
+        population="fixed-volume",
+    )  # fmt: skip
+    assert (ds["particles"].values[:, 1] == 0).all()
+    assert (ds["mass_out"].values[:, 1] == 50).all()
+    assert (ds["largest"].values[:, 1] == 0).all()
+    laws.agree(ds["mass"].values[:, 0], 50 * np.exp(-1.0))
+
+
+# --- the solver against exact solutions -----------------------------------------------------------
+
+
+def test_random_scission() -> None:
+    """Blatz and Tobolsky: geometric at all times, ``p' = (1 - p)^2/2 - F p/2``."""
+    times, rate = [1.0, 5.0, 40.0], 0.2
+    found = integrate.solve_ivp(
+        lambda t, p: 0.5 * (1 - p) ** 2 - 0.5 * rate * p, (0, 40), [0.0], t_eval=times,
+        rtol=1e-12, atol=1e-14,
+    )  # fmt: skip
+    p = found.y[0]
+    for law in (f"{rate} + 0*i*j", rate):
+        model = sx.Model(sx.kernels.Constant(), [P.Aggregation(), P.Fragmentation(law)])
+        ds = sx.solve(model, times)
+        np.testing.assert_allclose(ds["number_density"][0], 1 - p, rtol=1e-7)
+        np.testing.assert_allclose(ds["n"].sel(size=5)[0], (1 - p) ** 2 * p**4, rtol=1e-6)
+    state = steady_state(model)
+    np.testing.assert_allclose(state.moment(0), 1 - p[-1], rtol=1e-3)
+
+
+def test_monomer_source() -> None:
+    model = sx.Model(sx.kernels.Constant(), [P.Aggregation(), P.Source(0.5)], sx.initial.empty())
+    times = np.array([0.1, 1.0, 10.0])
+    ds = sx.solve(model, times)
+    np.testing.assert_allclose(ds["number_density"][0], np.tanh(0.5 * times), rtol=1e-7)
+    np.testing.assert_allclose(ds["mass"][0], 0.5 * times, rtol=1e-8)
+
+
+def test_becker_doering() -> None:
+    """Monomers come and go one by one: ``c_k = z**k`` in equilibrium, ``z / (1 - z)^2 = 3``."""
+    attach = sx.kernels.formula("max(0, 2 - min(i, j)) * (1 + max(0, 2 - max(i, j)))")
+    model = sx.Model(attach, [P.Aggregation(), P.Evaporation(1.0)], sx.initial.monodisperse(3.0))
+    ds = sx.solve(model, [400.0], largest=128)
+    z = (7 - np.sqrt(13)) / 6
+    np.testing.assert_allclose(ds["n"].values[0, 0, :20], z ** np.arange(1, 21), rtol=1e-6)
+    assert z**10 == pytest.approx(3.35876812947e-3, rel=1e-10)
+
+
+@pytest.mark.parametrize("printed", [False, True])
+def test_evaporation_in_the_free_molecular_regime(printed: bool) -> None:
+    """Reference values of ``c_j``, the density of the sizes from j on; errata, entry 19."""
+    evaporation = P.Evaporation.free_molecular(1.0, 1.0, printed=printed)
+    ds = sx.solve(sx.Model(FREE_MOLECULAR, [P.Aggregation(), evaporation]), [1.0, 5.0])
+    for row in csv.DictReader((DATA / "evaporation_c_jstar.csv").open()):
+        if (row["variant"] == "P") == printed:
+            for j in (2, 5, 10):
+                found = observed(ds, float(row["tau"]), slice(j - 1, None))
+                assert found == pytest.approx(float(row[f"c_{j}"]), rel=1e-7)
+
+
+def test_source_and_sink_oscillate() -> None:
+    """Ball et al.: sizes beyond 400 leave, and the number of clusters goes on swinging."""
+    kernel = sx.kernels.formula("0.5 * ((i/j)**a + (j/i)**a)", a=0.95)
+    processes = [P.Aggregation(), P.Source(1.0), P.Removal(above=400)]
+    model = sx.Model(kernel, processes, sx.initial.empty())
+    times = np.arange(0.0, 200.5, 0.5)
+    ds = sx.solve(model, times, tolerance=1e-5)
+    number = ds["number_density"].values[0, times > 120]
+    assert number.max() == pytest.approx(0.9747, abs=3e-3)
+    assert number.min() == pytest.approx(0.33118, abs=2e-3)
+    crossings = np.flatnonzero(np.diff(np.sign(number - 0.6)) > 0)
+    assert np.diff(crossings).mean() * 0.5 == pytest.approx(26.294, abs=0.3)
+    np.testing.assert_allclose(ds["mass"] - ds["mass_in"] + ds["mass_out"], 0.0, atol=1e-6)
+
+
+# --- mistakes, files ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: P.Evaporation(-1.0), "the evaporation rate = -1.0: is -1 for the size 1"),
+        (lambda: P.Evaporation("q"), "unknown name 'q'"),
+        (lambda: P.Evaporation([]), "must be a number, a formula in k"),
+        (lambda: P.Evaporation.free_molecular(-1.0, np.nan), "steepness = nan"),
+        (lambda: P.Fragmentation(0.0), "a finite number above zero"),
+        (lambda: P.Fragmentation("i - j"), "the fragmentation rate"),
+        (lambda: P.Removal(), "nothing would be removed"),
+        (lambda: P.Removal(above=0.5), "above = 0.5: must be a whole number"),
+        (lambda: P.Source({}), "at least one size"),
+        (lambda: P.Source({0: 1.0}), "the size 0"),
+        (lambda: P.Source(-1.0), "the rate -1.0"),
+        (lambda: sx.Model(sx.kernels.Constant(), initial=sx.initial.empty()), "give a source"),
+        (
+            lambda: sx.Model(sx.kernels.Constant(), [P.Source({9: 1.0}), P.Removal(above=5)]),
+            "sizes reach 9",
+        ),
+        (
+            lambda: steady_state(sx.Model(sx.kernels.Constant(), [P.Aggregation(), P.Source()])),
+            "no mass is given",
+        ),
+    ],
+)
+def test_mistakes(make: Any, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        make()
+
+
+def test_models_as_data() -> None:
+    processes = [
+        P.Aggregation(), P.Evaporation([0.0, 1.0, 0.5], varying="1 + t"),
+        P.Fragmentation(sx.kernels.Additive(0.1)), P.Removal("k/100", above=50),
+        P.Source({1: 1.0, 3: 0.5}),
+    ]  # fmt: skip
+    model = sx.Model(sx.kernels.Constant(), processes, sx.initial.empty())
+    data = model_to_dict(model)
+    back = model_from_dict(data)
+    assert model_to_dict(back) == data
+    one, other = (sx.solve(m, [1.0], largest=50)["moment"].values for m in (model, back))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_case_file() -> None:
+    text = """
+        [kernel]
+        name = "constant"
+        [[processes]]
+        name = "source"
+        rates = { 1 = 1.0, 3 = 0.5 }
+        [[processes]]
+        name = "evaporation"
+        rate = [0, 1, 0.5]
+        [[processes]]
+        name = "removal"
+        above = 50
+        [initial]
+        name = "empty"
+        [run]
+        times = [1]
+    """
+    case = cases.parse(text)
+    assert case.model.cut == 50
+    assert cases.parse(case.to_toml()) == case
+    with pytest.raises(InputError, match="formula in k"):
+        cases.parse(text.replace("[0, 1, 0.5]", "{ a = 1 }"))
