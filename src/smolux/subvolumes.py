@@ -27,8 +27,11 @@ from .core.state import (
     EXCESS,
     EXTINCT,
     FLOOR,
+    MASS_IN,
+    MASS_OUT,
     NEXT,
     PARTICLES,
+    RAISED,
     REPAIRS,
     TIME,
     TRIALS,
@@ -44,6 +47,7 @@ from .core.state import (
 from .methods.base import merged
 from .plan import LEAST, Plan
 from .population import doubles_at
+from .processes.base import PairProcess
 from .replicas import Group, empty_state, initial_populations
 
 Int = NDArray[np.int64]
@@ -155,7 +159,8 @@ class Divided:
             state = empty_state(plan, words[None])
             work = method.collect(rates, [given[k] for given in piles], state, plan.mass)
             state.clock[0, (TIME, VOLUME, FLOOR)] = start, clock[VOLUME] / used, clock[FLOOR]
-            state.clock[0, EXCESS:] = clock[EXCESS:]
+            state.clock[0, EXCESS] = clock[EXCESS]
+            state.clock[0, RAISED:] = clock[RAISED:]
             state.count[0, WINDOW] = window
             method.use(work, state, learnt)
             return Group.of(plan, self.first, state, work, self.windows)
@@ -172,11 +177,11 @@ class Divided:
         """Double the volume as often as the policy says; return how often each particle comes."""
         clock, count = self.state.clock[0], self.state.count[0]
         copies = 1
-        while count[PARTICLES] <= doubles_at(self.plan.population, self.plan.particles):
+        while 0 < count[PARTICLES] <= doubles_at(self.plan.population, self.plan.particles):
             copies *= 2
             count[PARTICLES] *= 2
             count[DOUBLINGS] += 1
-            clock[VOLUME] *= 2.0
+            clock[[VOLUME, MASS_IN, MASS_OUT]] *= 2.0
             clock[EXTINCT] = np.nan
         return copies
 
@@ -190,6 +195,7 @@ class Divided:
         self.tally.scalars[0, rows, 0] = scalars[0, :, 0]
         self.tally.scalars[0, rows, 2] += self.state.count[0, EVENTS]
         self.tally.scalars[0, rows, 4] = scalars[:, :, 4].max(axis=0)
+        self.tally.scalars[0, rows, 5:7] += self.state.clock[0, [MASS_IN, MASS_OUT]]
         self.tally.events[0, rows] += self.state.events[0]
         for k in range(due if self.plan.distribution else 0):
             self.distribution[0].append(merged([part.distribution[0][k] for part in self.parts]))
@@ -205,8 +211,10 @@ class Divided:
             if part.state.clock[0, FLOOR] > clock[FLOOR]:
                 clock[FLOOR] = part.state.clock[0, FLOOR]
                 count[[WORST_I, WORST_J]] = part.state.count[0, [WORST_I, WORST_J]]
-            np.maximum(clock[CLOCKS:], part.state.clock[0, CLOCKS:], out=clock[CLOCKS:])
+            # that and what follows: by how much bounds were raised
+            np.maximum(clock[RAISED:], part.state.clock[0, RAISED:], out=clock[RAISED:])
             self.state.events[0] += part.state.events[0]
+            clock[[MASS_IN, MASS_OUT]] += part.state.clock[0, [MASS_IN, MASS_OUT]]
             self.seconds += part.seconds
         clock[EXCESS] = clock[CLOCKS:].sum()
         if count[PARTICLES] == 1 and np.isnan(clock[EXTINCT]):
@@ -225,10 +233,16 @@ def _first_stretch(plan: Plan, replica: int) -> float:
     """Estimate how long it takes until the share of particles has collided after which to mix."""
     rng = np.random.default_rng(np.random.SeedSequence(plan.entropy, spawn_key=(replica, _GUESS)))
     sizes, counts = initial_populations(plan, [replica])[0]
+    if not counts.any():
+        return 1e-3 * plan.times[-1]
     i, j = rng.choice(sizes, (2, 1000), p=counts / counts.sum()).astype(float)
     with np.errstate(all="ignore"):
         mean = float(np.mean(rates_for(plan.model, plan.weighting).arrays(i, j)))
-    factors = sum(float(process.factor(0.0)) for process in plan.model.processes)
+    factors = sum(
+        float(process.factor(0.0))
+        for process in plan.model.processes
+        if isinstance(process, PairProcess)
+    )
     each = 0.5 * mean * factors * plan.particles / plan.volume
     if not (np.isfinite(each) and each > 0):
         return 1e-3 * plan.times[-1]
