@@ -14,7 +14,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from .errors import InputError
 
@@ -356,10 +355,14 @@ class Lognormal(Initial):
         """See `Initial.cumulative`; what lies below 1/2 counts as size 1."""
         sizes = np.floor(np.asarray(sizes, float))
         z = np.log(np.maximum(sizes, 1) / self.median + 0.5 / self.median) / np.log(self.sigma)
+        from scipy import special
+
         return np.where(sizes >= 1, special.ndtr(z), 0.0)
 
     def quantile(self, share: Float) -> Int:
         """See `Initial.quantile`."""
+        from scipy import special
+
         size = self.median * self.sigma ** special.ndtri(np.asarray(share, float))
         return np.maximum(np.ceil(size - 0.5), 1).astype(np.int64)
 

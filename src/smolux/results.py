@@ -14,8 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
+from xarray.indexes import PandasIndex
 
 from . import __version__
 from .errors import InputError
@@ -188,7 +190,7 @@ def to_dataset(model: Model, records: Records) -> xr.Dataset:
     if records.balance is not None:
         mass = (np.asarray(column, float) for column in records.balance)
         values |= {k: (("replica", "time"), m) for k, m in zip(_BALANCE, mass, strict=True)}
-    ds = xr.Dataset({**values, **ragged}, coordinates, _provenance(model, records))
+    ds = xr.Dataset({**values, **ragged}, _indexed(coordinates), _provenance(model, records))
     long_names = _COORDINATES | _RAGGED_NAMES | _BALANCE
     long_names |= {k: text for k, (_, text) in VARIABLES.items()}
     for name in map(str, ds.variables):
@@ -198,6 +200,20 @@ def to_dataset(model: Model, records: Records) -> xr.Dataset:
     if "row_size" in ds:
         ds["row_size"].attrs["sample_dimension"] = "sample"
     return ds
+
+
+def _indexed(coordinates: Mapping[str, Any]) -> xr.Coordinates:
+    """Return the same with indexes: to make them, xarray would load every library of arrays."""
+    found: dict[str, Any] = {}
+    indexes = {}
+    for name, values in coordinates.items():
+        if isinstance(values, np.ndarray):
+            index = PandasIndex(pd.Index(values), name, coord_dtype=values.dtype)
+            found |= index.create_variables()
+            indexes[name] = index
+        else:
+            found[name] = values
+    return xr.Coordinates(found, indexes)
 
 
 def population(ds: xr.Dataset, replica: int, time: float) -> tuple[NDArray[np.int64], ...]:

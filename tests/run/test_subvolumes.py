@@ -100,6 +100,20 @@ def test_a_kernel_above_its_bound_is_remembered() -> None:
     assert "above its bound" in json.loads(ds.attrs["warnings"])[0]
 
 
+def test_the_mass_of_open_systems_is_balanced() -> None:
+    given = {1: 0.5, 3: 0.1}
+    processes = [sx.processes.Aggregation(), sx.processes.Source(given), sx.processes.Removal(0.2)]
+    model = sx.Model(kernel=sx.kernels.Constant(), processes=processes)
+    ds = sx.simulate(
+        model, [0.5, 3.0], method="size-class", particles=4000, replicas=2, seed=3, sizes=16,
+        subvolumes=2, remix=0.3, population="fixed-volume",
+    )  # fmt: skip
+    inside = ds["moment"].sel(order=1) * ds["volume"]
+    np.testing.assert_array_equal(inside, 4000 + ds["mass_in"] - ds["mass_out"])
+    assert (np.diff(ds["mass_in"]) > 0).all()
+    assert (np.diff(ds["mass_out"]) > 0).all()
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [

@@ -46,7 +46,8 @@ def _give_room(s, w, used):
     whole = _rates_of_places(w, used)
     for k in range(used):
         g = w.queue[k]
-        come = w.flow[g] / (SHARE * w.meta[SPAN])
+        # half a particle is added for each class: what is rare and was not seen lately comes too
+        come = (w.flow[g] / SHARE + 0.5) / (w.meta[SPAN] + 0.5 * used)
         gain = max(w.number[g] - w.before[g] - math.sqrt(come * since), 0.0) / since
         worth = table * whole / (events * w.weight[k])
         spread = math.sqrt(2.0 * math.log(worth)) if worth > 1.0 else 0.0
@@ -90,6 +91,9 @@ def _renew(s, w):
             used += 1
         else:
             w.room[g] = w.before[g] = 0
+    if used == 0:  # nothing is there, so nothing can be drawn
+        s.clock[MAJORANT] = 0.0
+        return 0
     largest = w.queue[used - 1]
     present = used - 1
     while w.number[w.queue[present]] == 0 and present > 0:
