@@ -524,3 +524,29 @@ class TestWeightAlgorithm:
         left = np.arange(2, 100)
         step = 2 * 100 / (left * (left - 1) * weighted.max())
         assert (np.diff(step) < 0).all()
+
+
+class TestEvaporation:
+    """Entry 19: equation (18) lacks the ratio of the kernels."""
+
+    @pytest.mark.parametrize(("printed", "expected"), [(False, 0.0375206), (True, 0.0426732)])
+    def test_sizes_from_five_on(self, printed: bool, expected: float) -> None:
+        j = np.arange(1.0, 121)
+        kernel = ballistic(j[:, None], j) / ballistic(1.0, 1.0)
+        rate = np.exp(j ** (2 / 3) - (j - 1) ** (2 / 3) - (2 ** (2 / 3) - 1))
+        if not printed:
+            assert kernel[0, 4] / kernel[0, 1] == pytest.approx(1.286, abs=1e-3)
+            rate *= kernel[0] / kernel[0, 1]
+        rate[0] = 0.0
+
+        def change(t: float, n: Float) -> Float:
+            met = kernel * np.outer(n, n)
+            dn = -met.sum(axis=1) - rate * n
+            dn[1:] += 0.5 * np.array([np.trace(met[:, ::-1], 119 - k) for k in range(119)])
+            dn[:-1] += rate[1:] * n[1:]
+            dn[0] += rate @ n
+            return dn
+
+        n = solve_ivp(change, (0, 5), np.eye(120)[0], rtol=1e-6, atol=1e-12).y[:, -1]
+        assert n @ j == pytest.approx(1, abs=1e-6)
+        assert n[4:].sum() == pytest.approx(expected, rel=2e-5)
