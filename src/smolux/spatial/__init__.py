@@ -11,18 +11,28 @@ _LAZY = {
     "AllPairs": "direct",
     "Box": "box",
     "Cells": "direct",
+    "Contacts": "morphology",
+    "Dimension": "dimensions",
+    "Snapshot": "morphology",
     "SpatialProgress": "running",
     "System": "system",
     "Windowed": "windowed",
     "bimodal_radii": "initial",
+    "box_dimension": "dimensions",
+    "contacts": "morphology",
     "lattice": "initial",
     "log_of": "result",
     "lognormal_radii": "initial",
+    "mass_dimension": "dimensions",
     "mean_field_model": "kernel",
     "measured_kernel": "kernel",
+    "pair_distribution": "correlations",
     "random": "initial",
     "replay": "result",
+    "shapes": "morphology",
     "simulate": "running",
+    "snapshot": "morphology",
+    "structure_factor": "correlations",
     "system_of": "result",
     "write_trajectory": "trajectory",
 }
@@ -32,28 +42,41 @@ __all__ = [
     "AllPairs",
     "Box",
     "Cells",
+    "Contacts",
+    "Dimension",
+    "Snapshot",
     "SpatialProgress",
     "System",
     "Windowed",
     "bimodal_radii",
+    "box_dimension",
+    "contacts",
     "lattice",
     "log_of",
     "lognormal_radii",
+    "mass_dimension",
     "mean_field_model",
     "measured_kernel",
+    "pair_distribution",
     "random",
     "replay",
+    "shapes",
     "simulate",
+    "snapshot",
+    "structure_factor",
     "system_of",
     "write_trajectory",
 ]
 
 if TYPE_CHECKING:
     from .box import Box
+    from .correlations import pair_distribution, structure_factor
+    from .dimensions import Dimension, box_dimension, mass_dimension
     from .direct import AllPairs, Cells
     from .initial import bimodal_radii, lattice, lognormal_radii, random
     from .kernel import mean_field_model, measured_kernel
     from .methods import METHODS
+    from .morphology import Contacts, Snapshot, contacts, shapes, snapshot
     from .result import log_of, replay, system_of
     from .running import SpatialProgress, simulate
     from .system import System
