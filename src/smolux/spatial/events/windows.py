@@ -75,6 +75,8 @@ from .pairs import cluster_of, remove, remove_all, splice
 REST = 1e-13
 #: blocks that are listed between two returns
 SLICE = 500_000
+#: clusters are numbered anew when this many times fewer are left
+FEWER = 3
 #: all blocks are listed, which is cheaper for each, if more than this share is due
 MOST = 0.35
 #: windows after which discs are no longer in the order of space
@@ -278,7 +280,7 @@ def bind(d):
             return AT_REST
         if (t - clock[LATEST]) * v > patience * clock[LONGEST]:
             return LONELY
-        if judge_skin(f):
+        if judge_skin(f) or FEWER * f.count[CLUSTERS] < body.shape[0]:
             return RESKIN
         count[WINDOWS] += 1
         count[BATCH] += 1
