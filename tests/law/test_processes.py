@@ -20,6 +20,7 @@ from smolux import case as cases
 from smolux.deterministic import steady_state
 from smolux.errors import InputError
 from smolux.model_dict import model_from_dict, model_to_dict
+from smolux.processes.disruption import fragments
 
 DATA = Path(__file__).parent.parent / "reference" / "data"
 P = sx.processes
@@ -117,6 +118,44 @@ def test_nothing_is_left() -> None:
     laws.agree(ds["mass"].values[:, 0], 50 * np.exp(-1.0))
 
 
+def test_collisional_fragmentation() -> None:
+    """Debris of a power law, by mass flow; of monomers alone it is shattering."""
+    kernel, times = laws.kernel("constant"), [1.0, 6.0]
+    model, monomers, shattering = (
+        sx.Model(kernel, [P.Aggregation(), process])
+        for process in (
+            P.CollisionalFragmentation(0.2, 2.5, largest=12),
+            P.CollisionalFragmentation(0.2, [1.0]),
+            P.Shattering(0.2),
+        )
+    )
+    one, other = (sx.solve(m, times)["moment"].values for m in (monomers, shattering))
+    np.testing.assert_allclose(one, other, rtol=1e-9)
+    truth = sx.solve(model, times)
+    ds = simulated(model, times, 44, weighting="mass-flow")
+    for order in (0, 2):
+        expected = truth["moment"].sel(order=order).values[0]
+        laws.agree(ds["moment"].sel(order=order).values, expected, order)
+    for size in (1, 2, 5):
+        laws.agree(ds["n"].sel(size=size).values, truth["n"].sel(size=size).values[0], size)
+    np.testing.assert_allclose(ds["moment"].sel(order=1), 1.0, rtol=1e-12)
+
+
+def test_fragments() -> None:
+    """Mean numbers of fragments against draws, and their mass."""
+    process = P.CollisionalFragmentation(1.0, 2.5, largest=6)
+    mean = fragments(tuple(process.shares), 20)
+    np.testing.assert_allclose(mean @ np.arange(1, 7), np.arange(1, 21), rtol=1e-12)
+    draw = type(process).outcome(lambda rng: rng.random())
+    rng, sizes, counts = np.random.default_rng(5), *np.zeros((2, 6), np.int64)
+    found = np.zeros((4000, 6))
+    for row in found:
+        made = draw(7, 4, sizes, counts, rng, *process.parameters)
+        row[sizes[:made] - 1] = counts[:made]
+    assert (found @ np.arange(1, 7) == 11).all()
+    laws.agree(found, mean[10])
+
+
 # --- the solver against exact solutions -----------------------------------------------------------
 
 
@@ -194,6 +233,8 @@ def test_source_and_sink_oscillate() -> None:
         (lambda: P.Evaporation.free_molecular(-1.0, np.nan), "steepness = nan"),
         (lambda: P.Fragmentation(0.0), "a finite number above zero"),
         (lambda: P.Fragmentation("i - j"), "the fragmentation rate"),
+        (lambda: P.CollisionalFragmentation(0.1, [0.0, 1.0]), "above zero for k = 1"),
+        (lambda: P.CollisionalFragmentation(0.1, 2.0, largest=0.5), "largest fragment must be"),
         (lambda: P.Removal(), "nothing would be removed"),
         (lambda: P.Removal(above=0.5), "above = 0.5: must be a whole number"),
         (lambda: P.Source({}), "at least one size"),

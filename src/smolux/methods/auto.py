@@ -180,9 +180,12 @@ def candidates_per_event(
 
 def unforeseen(processes: Sequence[Process]) -> tuple[Method, str] | None:
     """Choose for systems that the estimate does not cover: not for encounters alone."""
-    if all(isinstance(process, PairProcess) for process in processes):
+    if all(isinstance(p, PairProcess) and not p.random for p in processes):
         return None
-    return SizeClass(), "particles come, go or change alone, and its cost depends least on sizes"
+    return (
+        SizeClass(),
+        "sizes are not foreseen for these processes, and its cost depends on them least",
+    )
 
 
 def choose(

@@ -2,6 +2,7 @@
 
 from .aggregation import Aggregation
 from .base import LoneProcess, PairProcess, Process
+from .disruption import CollisionalFragmentation
 from .evaporation import Evaporation
 from .fragmentation import Fragmentation
 from .removal import Removal
@@ -12,6 +13,7 @@ from .source import Source
 PROCESSES: tuple[type[Process], ...] = (
     Aggregation,
     Shattering,
+    CollisionalFragmentation,
     Evaporation,
     Fragmentation,
     Removal,
@@ -21,6 +23,7 @@ PROCESSES: tuple[type[Process], ...] = (
 __all__ = [
     "PROCESSES",
     "Aggregation",
+    "CollisionalFragmentation",
     "Evaporation",
     "Fragmentation",
     "LoneProcess",
