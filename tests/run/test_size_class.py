@@ -68,6 +68,23 @@ def test_few_particles_end_as_one_cluster(particles: int) -> None:
     assert (ds["collisions"].values == particles - 1).all()
 
 
+@pytest.mark.slow
+def test_ten_million_particles_follow_the_exact_solution() -> None:
+    particles, times = 10_000_000, [1.0, 10.0]
+    ds = sx.simulate(
+        model(kernel(c=1.0)), times, method="size-class", particles=particles, replicas=1, seed=6
+    )
+    exact = sx.exact.solution(sx.Model(kernel=sx.kernels.Constant()))
+    assert exact is not None
+    np.testing.assert_array_equal(ds["moment"].sel(order=1), 1.0)
+    # one replica, so by a bound of the variance: Poisson's, each particle doubled with its volume
+    sizes = np.array([1, 2, 5, 20])
+    volume = ds["volume"].values[0, :, None]
+    mean = exact.densities(np.array(times), sizes) * volume
+    error = np.sqrt(mean * volume / particles)
+    assert np.abs((ds["n"].sel(size=sizes).values[0] * volume - mean) / error).max() < 5.0
+
+
 def test_sizes_beyond_32_bits_and_beyond_the_classes_of_the_start() -> None:
     times = [1e3, 1e9, 1e12]
     ds = sx.simulate(model(kernel(c=1.0)), times, method="size-class", particles=400, replicas=8,
