@@ -18,6 +18,8 @@ _LAZY = {
     "resume": "smolux.stochastic",
     "solve": "smolux.deterministic",
     "sweep": "smolux.sweeps",
+    "ensemble": "smolux.ensembles",
+    "efficiency": "smolux.ensembles",
     "summary": "smolux.analysis",
     "InputError": "smolux.errors",
     "WorkerError": "smolux.errors",
@@ -26,6 +28,7 @@ _LAZY = {
     **dict.fromkeys(
         (
             "analysis",
+            "ensembles",
             "exact",
             "initial",
             "kernels",
@@ -49,6 +52,9 @@ __all__ = [
     "WorkerError",
     "__version__",
     "analysis",
+    "efficiency",
+    "ensemble",
+    "ensembles",
     "exact",
     "initial",
     "kernels",
@@ -69,6 +75,7 @@ __all__ = [
 if TYPE_CHECKING:
     from . import (
         analysis,
+        ensembles,
         exact,
         initial,
         kernels,
@@ -82,6 +89,8 @@ if TYPE_CHECKING:
     from . import plotting as plot
     from .analysis.summary import summary
     from .deterministic.solver import solve
+    from .ensembles.efficiency import efficiency
+    from .ensembles.ensemble import ensemble
     from .errors import InputError, Interrupted, SmoluxWarning, WorkerError
     from .model import Model
     from .stochastic import resume, simulate

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from . import check, compare, demo, kernels, movie, new, plot, run, show, sweep, verify
+from . import check, compare, demo, efficiency, kernels, movie, new, plot, run, show, sweep, verify
 from .guard import Commands
 
 app = typer.Typer(
@@ -55,5 +55,6 @@ app.command()(show.show)
 app.command()(plot.plot)
 app.command()(movie.movie)
 app.command()(compare.compare)
+app.command()(efficiency.efficiency)
 app.command()(kernels.kernels)
 app.command()(verify.verify)

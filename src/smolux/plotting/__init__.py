@@ -7,6 +7,7 @@ Most take ``ax=`` to draw into axes of your own.
 from .clusters import clusters
 from .comparison import comparison
 from .distribution import size_distribution
+from .efficiency import efficiency
 from .mean_field import mean_field
 from .movie import movie
 from .oscillation import oscillations
@@ -22,6 +23,7 @@ __all__ = [
     "coarsening",
     "comparison",
     "discs",
+    "efficiency",
     "mean_field",
     "moments",
     "movie",

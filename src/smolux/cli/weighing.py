@@ -1,0 +1,90 @@
+"""The work of ``smolux efficiency``: one case by several methods and weightings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..case import Case
+from ..errors import InputError, did_you_mean
+from ..weighting import WEIGHTINGS, WeightFunction
+from ..weighting.base import Weighting
+from . import console
+
+
+def weightings_of(texts: Sequence[str]) -> list[str | Weighting]:
+    """Read names of weightings; that of a weight function takes a power, as in ``name=0.5``.
+
+    Raises
+    ------
+    InputError
+        With all that are none.
+    """
+    known = [w.name for w in WEIGHTINGS]
+    found: list[str | Weighting] = []
+    problems = []
+    for text in texts:
+        name, _, power = text.partition("=")
+        where = f"--weighting {text}"
+        if name == WeightFunction.name:
+            try:
+                found.append(WeightFunction(float(power)))
+            except ValueError:
+                problems.append(f"{where}: give the power of the size, as in {name}=0.5")
+            except InputError as error:
+                problems += [f"{where}: {problem}" for problem in error.problems]
+        elif power or name not in known:
+            problems.append(f"{where}: unknown{did_you_mean(name, known)}")
+        else:
+            found.append(name)
+    if problems:
+        raise InputError(problems)
+    return found
+
+
+def run(
+    case: Case,
+    methods: Sequence[str] | None,
+    weightings: Sequence[str] | None,
+    observables: Sequence[str] | None,
+    figure: Path | None,
+) -> None:
+    """Measure efficiencies, print them as tables, and draw them if wanted.
+
+    Raises
+    ------
+    InputError
+        If the case has no table ``[run]``, or a method, weighting or observable is unknown.
+    """
+    if case.run is None:
+        raise InputError("efficiency: the case has no table [run], so there is nothing to simulate")
+    seeded = case.with_seed()
+    settings = seeded.run
+    assert settings is not None
+    chosen = weightings_of(weightings or ("number", "mass-flow"))
+    from .. import ensembles
+
+    console.say(
+        f"seed {settings.seed}, {settings.replicas:,} replicas of {settings.particles:,} particles"
+    )
+    ds = ensembles.efficiency(
+        seeded.model,
+        list(methods or [settings.method]),
+        chosen,
+        list(observables or dict.fromkeys([settings.target, "M2"])),
+        times=settings.times,
+        population=settings.population,
+        particles=settings.particles,
+        replicas=settings.replicas,
+        seed=settings.seed,
+    )
+    print(ensembles.efficiency_table(ds))
+    print(
+        f"Bias against: {ds.attrs['reference']}. Efficiency: 1 / (cost variance), over that of "
+        "the first row as ratio. Times are processor seconds without compilation."
+    )
+    if figure is not None:
+        from .. import plotting
+
+        plotting.save(plotting.efficiency(ds), figure)
+        print(f"{figure} written")

@@ -1,0 +1,191 @@
+"""Ensembles of small systems: statistics, reproducibility, coverage, efficiency.
+
+All runs share one compiled loop: weightings are powers of the size, which are data.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import smolux as sx
+from smolux.ensembles import Moments
+from smolux.ensembles.batches import Sampler, make_sampler
+from smolux.errors import InputError
+from smolux.exact import finite
+
+METHOD = "acceptance-rejection"
+MODEL = sx.Model(kernel=sx.kernels.Constant())
+NAMES = ("number_density", "M2", "n_3", "largest")
+
+
+def power(q: float) -> Any:
+    return sx.weighting.WeightFunction(q)
+
+
+def sampler(
+    observables: Any, times: Any, particles: int, replicas: int, q: float = 0.0, seed: int = 5
+) -> Sampler:
+    return make_sampler(
+        MODEL, times, observables, METHOD, power(q), "none", particles, replicas, seed
+    )
+
+
+# --- statistics ----------------------------------------------------------------------------------
+
+
+def test_moments_of_parts_are_those_of_the_whole():
+    rng = np.random.default_rng(1)
+    values = 1e3 + rng.exponential(size=(1000, 2, 3))
+    parts = [Moments.of(part) for part in np.split(values, [1, 2, 40, 500, 501])]
+    merged = parts[0]
+    for part in parts[1:]:
+        merged = merged + part
+    away = values - values.mean(axis=0)
+    assert merged.count == 1000
+    np.testing.assert_allclose(merged.mean, values.mean(axis=0), rtol=1e-14)
+    np.testing.assert_allclose(merged.variance, values.var(axis=0, ddof=1), rtol=1e-11)
+    np.testing.assert_allclose(merged.third, (away**3).sum(axis=0), rtol=1e-10)
+    np.testing.assert_allclose(merged.fourth, (away**4).sum(axis=0), rtol=1e-10)
+
+
+def test_equal_samples_have_no_variance():
+    merged = Moments.of(np.full((3, 1), 0.1)) + Moments.of(np.full((4, 1), 0.1))
+    assert merged.variance == 0.0
+
+
+def test_intervals_of_the_variance_cover_it():
+    """2000 samples of 3000 exponential numbers, of variance one: 93 to 97 % hold it."""
+    values = np.random.default_rng(2).exponential(size=(3000, 2000))
+    low, high = Moments.of(values).variance_interval()
+    assert 0.93 < np.mean((low < 1.0) & (high > 1.0)) < 0.97
+
+
+# --- ensembles -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("q", [0.0, 1.0])
+def test_the_replicas_are_those_of_simulate(q: float):
+    settings: dict[str, Any] = {
+        "method": METHOD, "weighting": power(q), "particles": 50, "seed": 3, "replicas": 203,
+    }  # fmt: skip
+    found = sx.ensemble(MODEL, [1.0, 4.0], NAMES, **settings, threads=2)
+    ds = sx.simulate(MODEL, [1.0, 4.0], **settings, orders=[2], sizes=5)
+    rows = np.stack(
+        [ds["number_density"], ds["moment"].sel(order=2), ds["n"].sel(size=3), ds["largest"]],
+        axis=1,
+    )
+    np.testing.assert_allclose(found["mean"], rows.mean(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(found["variance"], rows.var(axis=0, ddof=1), rtol=1e-9)
+    assert float(found["collisions"]) * 203 == pytest.approx(ds.attrs["events"], rel=1e-12)
+
+
+def test_initial_sizes_that_are_drawn_are_those_of_simulate():
+    model = sx.Model(kernel=sx.kernels.Constant(), initial=sx.initial.exponential(mean=3.0))
+    settings: dict[str, Any] = {"method": METHOD, "weighting": power(0.0), "particles": 50}
+    settings |= {"seed": 3, "replicas": 60}
+    found = sx.ensemble(model, [1.0], ["M2"], **settings)
+    rows = sx.simulate(model, [1.0], **settings)["moment"].sel(order=2).values
+    np.testing.assert_allclose(found["mean"].values[0], rows.mean(axis=0), rtol=1e-12)
+
+
+def test_threads_change_nothing():
+    runs = [
+        sx.ensemble(
+            MODEL, [1.0, 4.0], NAMES, method=METHOD, weighting=power(0.5), particles=40,
+            replicas=501, seed=8, threads=threads,
+        )
+        for threads in (1, 3)
+    ]  # fmt: skip
+    for name in ("mean", "variance", "standard_error", "variance_upper", "collisions"):
+        assert np.array_equal(runs[0][name], runs[1][name])
+
+
+def test_intervals_of_the_mean_contain_the_truth_of_a_finite_system():
+    """2000 ensembles of 30 replicas each: 93 to 97 % of their intervals hold the exact mean."""
+    blocks, each, particles = 2000, 30, 24
+    source = sampler(("number_density", "M2"), [1.0, 3.0], particles, blocks * each)
+    law = finite.Constant(particles)
+    truth = np.array(
+        [
+            [law.number_mean(t) / particles for t in (1.0, 3.0)],
+            [law.second_moment(t) for t in (1.0, 3.0)],
+        ]
+    )
+    step, values = source.plan.replicas, []
+    for first in range(0, blocks * each, step):
+        count = min(step, blocks * each - first)
+        values.append(source.values(source.start(first, count), lambda: False))
+    rows = np.concatenate(values).reshape(blocks, each, 2, 2)
+    low, high = Moments.of(np.moveaxis(rows, 1, 0)).interval()
+    covered = np.mean((low <= truth) & (truth <= high), axis=0)
+    assert (covered > 0.93).all()
+    assert (covered < 0.97).all()
+
+
+# --- efficiency ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def measured() -> Any:
+    return sx.efficiency(
+        MODEL, [METHOD], [power(0.0), power(1.0)], ["n_50", "M2"], times=[20.0], population="none",
+        particles=512, replicas=1500, seed=4,
+    )  # fmt: skip
+
+
+def test_mass_flow_has_the_smaller_variance_of_large_sizes(measured: Any):
+    """Constant kernel, u_50(20): 60 to 130 times smaller with doubling, more without."""
+    number, flow = measured.isel(scheme=0), measured.isel(scheme=1)
+    at = {"observable": "n_50", "time": 20.0}
+    assert float(number["variance_lower"].sel(at)) > 10 * float(flow["variance_upper"].sel(at))
+
+
+def test_the_bias_is_that_of_the_finite_system(measured: Any):
+    """M2 of N particles: ``N - (N - 1) exp(-t / N)`` by number, ``1 + t (N - 1) / N`` by mass."""
+    expected = [512 - 511 * np.exp(-20 / 512) - 21, 1 + 20 * 511 / 512 - 21]
+    found = measured.sel(observable="M2", time=20.0)
+    assert (np.abs(found["bias"] - expected) < 4 * found["standard_error"]).all()
+
+
+def test_efficiency_is_what_it_says(measured: Any):
+    eff = 1 / (measured["cost"] * measured["variance"])
+    np.testing.assert_allclose(measured["efficiency"], eff.transpose(*measured["efficiency"].dims))
+    ratio = measured["efficiency"] / measured["efficiency"].isel(scheme=0)
+    np.testing.assert_allclose(measured["ratio"], ratio)
+    inside = (measured["ratio_lower"] <= ratio) & (ratio <= measured["ratio_upper"])
+    assert inside.all()
+    top = measured["efficiency"] == measured["efficiency"].max("scheme")
+    assert measured["best"].where(top, True).all()
+
+
+def test_the_same_twice_is_not_told_apart():
+    """Two schemes of one law, number and the power zero: only chance is between them."""
+    ds = sx.efficiency(
+        MODEL, [METHOD], [power(0.0), power(1e-300)], ["M2"], times=[4.0], particles=40,
+        replicas=800, seed=9, exact=[[5.0]],
+    )  # fmt: skip
+    assert ds["best"].all()
+    assert ds.attrs["reference"] == "given"
+
+
+def test_table_and_figure(measured: Any, tmp_path: Path):
+    text = sx.ensembles.efficiency_table(measured)
+    assert "n_50 at t = 20" in text
+    assert "weight-function=1" in text
+    figure = sx.plotting.efficiency(measured)
+    assert len(figure.axes) == 2
+    assert sx.plotting.save(figure, tmp_path / "eff.png").stat().st_size > 5000
+
+
+def test_mistakes_are_told_together():
+    with pytest.raises(InputError) as error:
+        sx.ensemble(MODEL, [1.0, 0.5], ("M2", "weight"), replicas=1, particles=1)
+    text = str(error.value)
+    for word in ("times", "weight", "replicas = 1", "particles = 1"):
+        assert word in text
+    with pytest.raises(InputError, match="methods"):
+        sx.efficiency(MODEL, [], times=[1.0])
