@@ -100,7 +100,7 @@ def save(path: str | Path, plan: Plan, groups: Sequence[Group | Divided]) -> Non
 
 def _put(arrays: dict[str, np.ndarray], key: str, group: Group | Divided) -> dict[str, Any]:
     """Add the arrays of a group under names that begin with `key`; return the rest."""
-    kinds = {"state": group.state, "tally": group.tally, "windows": group.windows}
+    kinds: dict[str, Any] = {"state": group.state, "tally": group.tally, "windows": group.windows}
     if isinstance(group, Group):
         kinds["work"] = group.work
     for kind, values in kinds.items():

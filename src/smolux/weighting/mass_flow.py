@@ -10,7 +10,15 @@ from ..intervals import Interval
 from ..kernels.base import Kernel
 from ..kernels.majorant import Majorant
 from .base import Weighting
-from .weight_function import power, power_factor, power_interval, power_majorant
+from .weight_function import power_interval, power_majorant
+
+
+def _weight(size: Any) -> Any:
+    return size
+
+
+def _factor(i: Any, j: Any) -> Any:
+    return (i + j) / (i * j)
 
 
 @dataclass(frozen=True)
@@ -33,17 +41,12 @@ class MassFlow(Weighting):
     @property
     def weight(self) -> Callable[..., Any]:
         """See `Weighting.weight`."""
-        return power
+        return _weight
 
     @property
     def factor(self) -> Callable[..., Any]:
         """See `Weighting.factor`."""
-        return power_factor
-
-    @property
-    def parameters(self) -> tuple[float, ...]:
-        """See `Weighting.parameters`: those of `WeightFunction` with the power one."""
-        return (1.0,)
+        return _factor
 
     def interval(self, i: Interval, j: Interval) -> Interval:
         """See `Weighting.interval`."""

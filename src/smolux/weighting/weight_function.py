@@ -23,13 +23,11 @@ _STEEPEST = 8.0
 
 def power(size: Any, q: Any) -> Any:
     """Weight ``size**q``."""
-    return size if q == 1.0 else size**q
+    return size**q
 
 
 def power_factor(i: Any, j: Any, q: Any) -> Any:
     """Return the largest of ``(i + j)**q``, ``i**q`` and ``j**q`` over ``(i j)**q``."""
-    if q == 1.0:
-        return (i + j) / (i * j)
     if q < 0.0:
         return np.maximum(i, j) ** (-q)
     return (1.0 / i + 1.0 / j) ** q
