@@ -165,8 +165,8 @@ def test_efficiency_is_what_it_says(measured: Any):
 def test_the_same_twice_is_not_told_apart():
     """Two schemes of one law, number and the power zero: only chance is between them."""
     ds = sx.efficiency(
-        MODEL, [METHOD], [power(0.0), power(1e-300)], ["M2"], times=[4.0], particles=40,
-        replicas=800, seed=9, exact=[[5.0]],
+        MODEL, schemes=[(METHOD, power(0.0)), (METHOD, power(1e-300))], observables=["M2"],
+        times=[4.0], particles=40, replicas=800, seed=9, exact=[[5.0]],
     )  # fmt: skip
     assert ds["best"].all()
     assert ds.attrs["reference"] == "given"
@@ -189,3 +189,5 @@ def test_mistakes_are_told_together():
         assert word in text
     with pytest.raises(InputError, match="methods"):
         sx.efficiency(MODEL, [], times=[1.0])
+    with pytest.raises(InputError, match=r"(?s)threads = 0.*schemes"):
+        sx.efficiency(MODEL, schemes=[("inverse",)], times=[1.0], threads=0)

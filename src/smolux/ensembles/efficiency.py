@@ -55,6 +55,7 @@ def efficiency(
     particles: int = 100,
     replicas: int = 20_000,
     seed: int | None = None,
+    schemes: Sequence[tuple[str | Method, str | Weighting]] | None = None,
     exact: ArrayLike | None = None,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
@@ -76,6 +77,8 @@ def efficiency(
         Of each pair.
     seed : int, optional
         Of the first pair; those that follow have the numbers after it.
+    schemes : sequence of (method, weighting), optional
+        Only these pairs, whatever `methods` and `weightings` are.
     exact : array_like of shape (observables, times), optional
         What the bias is measured against. If left out: the exact solution of the model if one is
         known, else that of the rate equations by `solve`.
@@ -122,8 +125,7 @@ def efficiency(
     """
     problems: list[str] = []
     workers = checked_threads(threads, problems)
-    listed = [_listed("methods", methods, problems), _listed("weightings", weightings, problems)]
-    pairs = list(product(*listed)) or [("auto", "number")]
+    pairs = _pairs(methods, weightings, schemes, problems)
     entropy = np.random.SeedSequence().entropy if seed is None else seed
     samplers: list[Sampler] = []
     for method, weighting in pairs:
@@ -161,6 +163,22 @@ def efficiency(
         del given[one]
     ds = xr.Dataset(variables, coordinates, provenance("Efficiency of methods", given))
     return labelled(ds, _LONG_NAMES)
+
+
+def _pairs(methods: Any, weightings: Any, schemes: Any, problems: list[str]) -> list[Any]:
+    """Return the pairs to measure; any one, with problems, if there are none."""
+    if schemes is None:
+        listed = (
+            _listed(k, v, problems) for k, v in (("methods", methods), ("weightings", weightings))
+        )
+        return list(product(*listed)) or [("auto", "number")]
+    try:
+        pairs = [(method, weighting) for method, weighting in schemes]
+    except (TypeError, ValueError):
+        pairs = []
+    if not pairs:
+        problems.append(f"schemes = {schemes!r}: must be a list of pairs (method, weighting)")
+    return pairs or [("auto", "number")]
 
 
 def _listed(what: str, given: Any, problems: list[str]) -> list[Any]:
