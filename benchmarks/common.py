@@ -94,6 +94,7 @@ python benchmarks/memory.py
 python benchmarks/solver.py
 python benchmarks/flat_low_rank.py
 python benchmarks/osinsky_2022.py
+python benchmarks/kolodko_2003.py
 python benchmarks/auto.py
 ```
 """

@@ -141,13 +141,14 @@ class Group:
             budget,
         )
 
-    def advance(self, stop: Callable[[], bool]) -> None:
+    def advance(self, stop: Callable[[], bool], loop: Any = None) -> None:
         """Go on until done or until `stop` says so, asked about ten times a second.
 
         Every call gets something done, so that a run interrupted again and again comes to its end.
+        `loop` is what `loop_for` returns for the plan, if it is known already.
         """
         budget = 10_000
-        loop = self._loop()  # found once: what tells loops apart takes time
+        loop = loop or self._loop()  # found once: what tells loops apart takes time
         while not self.done:
             before = self._effort()
             start = time.perf_counter()

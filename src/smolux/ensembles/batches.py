@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.assembly import rates_for, windows_for
+from smolux.assembly import loop_for, rates_for, windows_for
 from smolux.core.rng import streams
 from smolux.core.state import BUDGET, DONE, State
 from smolux.errors import InputError
@@ -32,8 +32,8 @@ from .moments import Moments
 
 Float = NDArray[np.float64]
 
-#: replicas of a batch at most: more would not stay in the cache of a core
-_TOGETHER = 512
+#: replicas of a batch at most: fewer cost more each, more leave the cache of a core
+_TOGETHER = 1024
 #: particles, and numbers observed, of a batch at most
 _PARTICLES, _OBSERVED = 200_000, 1_000_000
 #: batches that the replicas are cut into at least: their scatter is the error of the cost
@@ -76,6 +76,7 @@ class Sampler:
         self.plan = plan
         self.goals = [_goal(name, plan.orders, plan.sizes, []) for name in observables]
         self._looks = [replace(plan, goal=goal) for goal in self.goals]
+        self._loop = loop_for(plan.model, plan.method, plan.weighting)
         self._windows = windows_for(plan.model.processes, plan.times[-1], plan.weighting)
         first = Group.start(plan, 0, 1)
         first.compile()
@@ -129,9 +130,9 @@ class Sampler:
         """Run a group and return the observables, of shape (replicas, observables, times)."""
         # one runs ahead, so that the others find the bounds that all of them need
         group.codes[1:] = DONE
-        group.advance(stop)
+        group.advance(stop, self._loop)
         group.codes[1:] = BUDGET
-        group.advance(stop)
+        group.advance(stop, self._loop)
         return np.stack([observable(look, [group])[0] for look in self._looks], axis=1)
 
     def batch(self, first: int, count: int, stop: Callable[[], bool]) -> Batch:
