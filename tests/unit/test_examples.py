@@ -31,7 +31,7 @@ def small(monkeypatch, tmp_path):
     results = []
 
     def small_simulation(model, times, **settings):
-        few = min(settings.get("particles", 100_000), 1000)
+        few = min(settings.get("particles", 100_000), 1000 * settings.get("subvolumes", 1))
         settings |= {"particles": few, "replicas": 3}
         if "target_error" in settings:
             settings |= {"replicas": 8, "max_replicas": 12}

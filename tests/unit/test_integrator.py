@@ -145,7 +145,7 @@ def test_gain_is_computed_once_or_not_at_all():
     n = np.exp(-eq.sizes / 4)
     eq.rates(np.zeros(3), np.array([n, n, n]))
     assert calls == [3]
-    eq.model = sx.Model(sx.kernels.Ballistic(), [sx.processes.Shattering(0.1)])
+    eq.pairs = [sx.processes.Shattering(0.1)]
     eq.rates(np.zeros(3), np.array([n, n, n]))
     assert calls == [3]
 
