@@ -16,6 +16,7 @@ _LAZY = {
     "Snapshot": "morphology",
     "SpatialProgress": "running",
     "System": "system",
+    "TimeStepping": "time_stepping",
     "Windowed": "windowed",
     "bimodal_radii": "initial",
     "box_dimension": "dimensions",
@@ -47,6 +48,7 @@ __all__ = [
     "Snapshot",
     "SpatialProgress",
     "System",
+    "TimeStepping",
     "Windowed",
     "bimodal_radii",
     "box_dimension",
@@ -80,6 +82,7 @@ if TYPE_CHECKING:
     from .result import log_of, replay, system_of
     from .running import SpatialProgress, simulate
     from .system import System
+    from .time_stepping import TimeStepping
     from .trajectory import write_trajectory
     from .windowed import Windowed
 

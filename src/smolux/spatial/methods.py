@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from .direct import AllPairs, Cells
 from .method import SpatialMethod
+from .time_stepping import TimeStepping
 from .windowed import Windowed
 
 #: every method
-METHODS: tuple[type[SpatialMethod], ...] = (Windowed, Cells, AllPairs)
+METHODS: tuple[type[SpatialMethod], ...] = (Windowed, Cells, AllPairs, TimeStepping)

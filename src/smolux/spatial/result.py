@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .. import results
 from ..errors import InputError
 from .box import Box
+from .genealogy import merger_tree
 from .playing import Merging, replayed
 from .system import System
 from .trace import ORDERS, Log, Series, Trace, size_edges
@@ -152,14 +153,14 @@ def to_tree(
         {
             "/": root,
             "series": series_ds,
-            "events": _events(log, merging, n),
+            "events": _events(log, merging, system),
             "walls": _dataset(_WALLS, walls),
         }
     )
 
 
-def _events(log: Log, merging: Merging | None, discs: int) -> xr.Dataset:
-    merges = log.merges
+def _events(log: Log, merging: Merging | None, system: System) -> xr.Dataset:
+    merges, discs = log.merges, len(system)
     values = {
         "time": log.time[merges],
         "first": log.first[merges],
@@ -177,6 +178,8 @@ def _events(log: Log, merging: Merging | None, discs: int) -> xr.Dataset:
             "energy_loss": merging.loss,
             "gap": merging.gap,
         }
+    else:
+        values |= merger_tree(log.first[merges], log.second[merges], system.mass)
     return _dataset({name: _EVENTS[name] for name in _EVENTS if name in values}, values)
 
 
@@ -272,7 +275,7 @@ def replay(result: xr.DataTree, time: float) -> xr.Dataset:
     reached = float(result.attrs["time_reached"])
     if not 0 <= time <= reached:
         raise InputError(f"time = {time!r}: must lie between 0 and {reached:g}, which was reached")
-    if "parents" not in result["events"]:
+    if "point" not in result["events"]:
         raise InputError(
             f"result: was made by the method {result.attrs.get('method')!r}, whose log does not "
             "determine the motion; use an event-driven method"

@@ -80,7 +80,7 @@ def instants_of(result: xr.DataTree, times: ArrayLike | None, frames: int) -> Fl
     """
     log_of(result)  # is it a spatial result at all
     reached = float(result.attrs["time_reached"])
-    if "parents" not in result["events"]:
+    if "point" not in result["events"]:
         raise InputError(
             f"result: was made by the method {result.attrs.get('method')!r}, whose log does not "
             "determine the motion; use an event-driven method"

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.compile import cold_piece, piece
-from .geometry import FILLED, larger, shift
+from .geometry import FILLED, larger, shift, smaller
 from .grid import insert, neighbour
 
 # Entries of Steps.clock.
@@ -44,9 +44,7 @@ TOUCHED = 10
 CONTACTS = 11
 SLOTS = 12
 NEARS = 13
-RELOADS = 14
-MOST_PASSES = 15
-COUNTS = 16
+COUNTS = 14
 
 
 class Steps(NamedTuple):
@@ -60,6 +58,7 @@ class Steps(NamedTuple):
     x: np.ndarray
     radius: np.ndarray
     room: np.ndarray
+    inertia: np.ndarray  # mass of a disc
     label: np.ndarray
     member: np.ndarray  # the next one of a cluster, in a ring
     binned: np.ndarray
@@ -126,8 +125,8 @@ def bind(d):
         for i in range(n):
             c = s.label[i]
             for k in range(d):
-                s.low[c, k] = min(s.low[c, k], s.x[i, k] - s.room[i])
-                s.high[c, k] = max(s.high[c, k], s.x[i, k] + s.room[i])
+                s.low[c, k] = smaller(s.low[c, k], s.x[i, k] - s.room[i])
+                s.high[c, k] = larger(s.high[c, k], s.x[i, k] + s.room[i])
 
     @cold_piece
     def list_pairs(s):
@@ -138,9 +137,9 @@ def bind(d):
         side = s.clock[REACH] * s.clock[WIDEST] + skin
         cells = np.int64(1)
         for k in range(d):
-            s.cells[k] = max(np.int64(s.length[k] / side), 1)
+            s.cells[k] = larger(np.int64(s.length[k] / side), 1)
             while cells * s.cells[k] > s.head.shape[0]:
-                s.cells[k] = max(s.cells[k] // 2, 1)
+                s.cells[k] = larger(s.cells[k] // 2, 1)
             cells *= s.cells[k]
         s.head[:cells], s.owner[:cells] = -1, NONE
         for i in range(s.x.shape[0]):
@@ -151,7 +150,7 @@ def bind(d):
             insert(i, s.binned[i], s.length, s.cells, s.head, s.following)
             c = neighbour(s.binned[i], (3**d - 1) // 2, s.length, s.period, s.cells)
             own = s.owner[c]
-            s.owner[c] = s.label[i] if own in (NONE, s.label[i]) else MIXED
+            s.owner[c] = s.label[i] if own == NONE or own == s.label[i] else MIXED
         found, checked = 0, 0
         for i in range(s.x.shape[0]):
             for code in range(3**d):
@@ -184,7 +183,7 @@ def bind(d):
             skin *= 1.25
         elif s.count[WORK] > 2 * listing:
             skin /= 1.3
-        s.clock[SKIN] = min(max(skin, s.clock[THINNEST]), s.clock[THICKEST])
+        s.clock[SKIN] = smaller(larger(skin, s.clock[THINNEST]), s.clock[THICKEST])
 
     @cold_piece
     def look(s):
@@ -210,7 +209,7 @@ def bind(d):
                         break
                     s.contact[found, 0], s.contact[found, 1] = i, j
                     found += 1
-            due = min(due, s.due[p])
+            due = smaller(due, s.due[p])
             p += 1
         s.clock[DUE] = due
         s.count[CONTACTS] = found
@@ -252,7 +251,7 @@ def bind(d):
                     s.low[c, k] + s.off[c, k] < 0.0 or s.high[c, k] + s.off[c, k] > s.length[k]
                 ):
                     done, push = reflect(s, c, k, dt, log, done, time)
-                    pushed = max(pushed, push)
+                    pushed = larger(pushed, push)
         s.clock[WAY] += fastest * dt + math.sqrt(d) * pushed
         return done
 
@@ -278,8 +277,8 @@ def bind(d):
             for _ in range(s.size[b]):
                 s.x[m, k] += move
                 m = np.int64(s.member[m])
-            s.low[a, k] = min(s.low[a, k], s.low[b, k] + move)
-            s.high[a, k] = max(s.high[a, k], s.high[b, k] + move)
+            s.low[a, k] = smaller(s.low[a, k], s.low[b, k] + move)
+            s.high[a, k] = larger(s.high[a, k], s.high[b, k] + move)
             s.v[a, k] = (ma * s.v[a, k] + mb * s.v[b, k]) / (ma + mb)
         m = np.int64(j)
         for _ in range(s.size[b]):
