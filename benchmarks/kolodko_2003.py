@@ -123,9 +123,9 @@ if __name__ == "__main__":
         "",
         "Collisions bound what can be reached. Up to these times mass flow has 4.8 (constant) and "
         "5.0 (additive) collisions for each particle, direct simulation with doubling 1.8 and 1.1, "
-        "so that a sample costs 2.7 and 4.5 times as much where a collision costs the same. A density "
-        "of size k rests on k times as many particles, its variance is about k times smaller, and "
-        "with doubling that advantage shrinks by the 8 or 4 copies of the volume.",
+        "so that a sample costs 2.7 and 4.5 times as much where a collision costs the same. A "
+        "density of size k rests on k times as many particles, its variance is about k times "
+        "smaller, and with doubling that advantage shrinks by the 8 or 4 copies of the volume.",
     ]
     write_section(
         "kolodko-2003", "Weightings and small systems (Kolodko and Sabelfeld 2003)", lines
