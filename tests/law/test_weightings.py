@@ -35,7 +35,12 @@ def model(
     return sx.Model(laws.kernel(law), processes, initial or sx.initial.monodisperse())
 
 
-every_method = pytest.mark.parametrize("method", METHODS)
+#: loops of the others compile long
+QUICK = ("size-class", "acceptance-rejection")
+every_method = pytest.mark.parametrize(
+    "method",
+    [pytest.param(m, marks=() if m in QUICK else pytest.mark.slow) for m in METHODS],
+)
 
 
 # --- small systems -------------------------------------------------------------------------------

@@ -115,6 +115,7 @@ def test_the_number_of_classes_is_checked() -> None:
         SizeClass(3)
 
 
+@pytest.mark.slow
 def test_a_kernel_that_fails_beyond_some_size_is_named() -> None:
     law = sx.kernels.formula("1/(c - i*j)", c=4e12)  # infinite for sizes of two million
     case = model(law, initial=sx.initial.from_sizes({1_000_000: 1.0}))

@@ -70,8 +70,9 @@ def test_goes_on_from_a_checkpoint(distribution: bool, tmp_path: Path) -> None:
 
 def _clusters(remix: float) -> np.ndarray:
     ds = sx.simulate(
-        sx.Model(kernel=sx.kernels.Constant()), [2.0], method="size-class", particles=16, seed=1,
-        replicas=200, population="fixed-volume", subvolumes=4, remix=remix, sizes=16,
+        runs.model(0.0, sx.initial.monodisperse(), c1=0.0), [2.0], method="size-class",
+        particles=16, seed=1, replicas=200, population="fixed-volume", subvolumes=4, remix=remix,
+        sizes=16,
     )  # fmt: skip
     return ds["particles"].values[:, 0]
 
@@ -82,13 +83,14 @@ def test_mixing_takes_the_bias_away(monkeypatch: pytest.MonkeyPatch) -> None:
     exact = finite.number_mean("constant", 16, 2.0)
     apart, mixed = _clusters(10.0), _clusters(0.2)
     error = mixed.std(ddof=1) / np.sqrt(200)
-    assert apart.mean() - exact > 4 * error  # four particles each: not the same system
-    assert abs(mixed.mean() - exact) < 3.5 * error
+    assert apart.mean() - exact > 3 * error  # four particles each: not the same system
+    assert abs(mixed.mean() - exact) < 3 * error
     # fluctuations are those of the whole: the variance of 200 values scatters by 10 %
     variance = finite.number_variance("constant", 16, 2.0)
     assert 0.6 < mixed.var() / variance < 1.6
 
 
+@pytest.mark.slow
 def test_a_kernel_above_its_bound_is_remembered() -> None:
     def ridge(i: float, j: float) -> float:
         return 1.0 + 20.0 * np.exp(-((i - j - 37.0) ** 2)) + 20.0 * np.exp(-((j - i - 37.0) ** 2))
@@ -100,6 +102,7 @@ def test_a_kernel_above_its_bound_is_remembered() -> None:
     assert "above its bound" in json.loads(ds.attrs["warnings"])[0]
 
 
+@pytest.mark.slow
 def test_the_mass_of_open_systems_is_balanced() -> None:
     given = {1: 0.5, 3: 0.1}
     processes = [sx.processes.Aggregation(), sx.processes.Source(given), sx.processes.Removal(0.2)]

@@ -15,7 +15,12 @@ import smolux as sx
 from smolux.errors import InputError
 from smolux.timefunction import TimeFunction
 
-every_method = pytest.mark.parametrize("method", runs.METHODS)
+#: loops of the others compile long
+QUICK = ("size-class", "acceptance-rejection")
+every_method = pytest.mark.parametrize(
+    "method",
+    [pytest.param(m, marks=() if m in QUICK else pytest.mark.slow) for m in runs.METHODS],
+)
 #: few buckets: a table for the many that are usual would be a million calls from Python
 SETTINGS = {"inverse": sx.methods.Inverse(buckets=64)}
 #: a size that no sample of the checks at the start holds
