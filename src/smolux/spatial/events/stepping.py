@@ -14,11 +14,13 @@ from .steps import (
     CONTACTS,
     FAILURES,
     LATEST,
+    REACH,
     SCALE,
     SKIN,
     STEPS,
     TIME,
     WAY,
+    WIDEST,
 )
 
 # Why the loop returned.
@@ -110,7 +112,10 @@ def bind(d):
                 return OBSERVE, done
             last = dt >= until - clock[TIME]
             dt = until - clock[TIME] if last else dt
-            if clock[WAY] + fastest * dt > 0.25 * clock[SKIN]:
+            # what is left of the half skin is for what a minimisation moves
+            spare = 0.5 * (clock[REACH] - 1.0) * clock[WIDEST]
+            lasts = larger(0.25 * clock[SKIN], 0.5 * clock[SKIN] - spare)
+            if clock[WAY] + fastest * dt > lasts:
                 choose_skin(s)
                 if not list_pairs(s):
                     clock[WAY] = math.inf
