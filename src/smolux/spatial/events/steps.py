@@ -51,7 +51,7 @@ class Steps(NamedTuple):
     """Discs, clusters, lists, and what a step needs to be taken back."""
 
     clock: np.ndarray
-    count: np.ndarray
+    count: np.ndarray  # type: ignore[assignment]
     length: np.ndarray
     period: np.ndarray
     # by disc
