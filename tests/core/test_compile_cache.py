@@ -10,7 +10,6 @@ import subprocess
 import sys
 import types
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ import pytest
 import smolux as sx
 from smolux.assembly import loop_for
 from smolux.core import compile as compiling
-from smolux.core.compile import cache_directory, digest, piece, statistics
+from smolux.core.compile import cache_directory, digest, statistics
 from smolux.weighting import WEIGHTINGS, Number
 
 #: a function with everything that an edit may touch
@@ -273,6 +272,7 @@ def some_kernels() -> list[Any]:
     ]
 
 
+@pytest.mark.slow
 def test_nothing_shares_an_entry() -> None:
     owner: dict[str, Any] = {}
     made: dict[int, Any] = {}
@@ -296,29 +296,14 @@ def test_values_of_parameters_share_the_loop() -> None:
     assert loop(formula("i+j"), 0.1) is not loop(formula("j+i"), 0.1)
 
 
-@dataclass(frozen=True)
-class Power(Number):
-    """A weighting with a setting that becomes part of the compiled rate."""
-
-    exponent: float = 1.0
-
-    def compiled(self, rate: Any) -> Any:
-        exponent = self.exponent
-
-        @piece
-        def weighted(i, j, *p):
-            return rate(i, j, *p) * (i * j) ** exponent
-
-        return weighted
-
-
-def test_settings_of_a_weighting_make_another_loop() -> None:
+def test_what_a_weighting_compiles_in_makes_another_loop() -> None:
     def loop(weighting: Any) -> Any:
         return loop_for(sx.Model(sx.kernels.Constant()), sx.methods.METHODS[0](), weighting)
 
-    loops = [loop(Number()), loop(Power()), loop(Power(2.0))]
+    power = sx.weighting.WeightFunction
+    loops = [loop(Number()), loop(power(2.0)), loop(power("1 + l"))]
     assert len({id(made) for made in loops}) == len({digest(made) for made in loops}) == 3
-    assert loop(Power(2.0)) is loops[2]
+    assert loop(power(0.5)) is loops[1]  # the exponent is data
     assert loop(Number()) is loops[0]
 
 

@@ -77,6 +77,7 @@ def _clusters(remix: float) -> np.ndarray:
     return ds["particles"].values[:, 0]
 
 
+@pytest.mark.slow
 def test_mixing_takes_the_bias_away(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plan, "LEAST", 4)
     monkeypatch.setattr(subvolumes, "LEAST", 4)

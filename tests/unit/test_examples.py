@@ -22,6 +22,8 @@ GUIDES = [
     for page in sorted((ROOT / "docs" / folder).glob("*.md"))
     if "```python" in page.read_text(encoding="utf-8")
 ]
+#: these compile more loops than others
+LONG = ("efficiency", "many-cores", "units")
 
 
 @pytest.fixture
@@ -99,7 +101,13 @@ def test_readme_case_file(small):
     assert ds.sizes["time"] == len(case.run.times)
 
 
-@pytest.mark.parametrize("page", GUIDES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.slow if page.stem in LONG else (), id=page.stem)
+        for page in GUIDES
+    ],
+)
 def test_code_of_a_guide(page, small, tmp_path):
     """The blocks of a page run one after the other, as a reader would type them."""
     model = sx.Model(kernel=sx.kernels.Constant())

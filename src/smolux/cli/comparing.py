@@ -93,9 +93,8 @@ def _simulated(case: Case, name: str, number: int, progress: Display) -> Compute
     run = case.run
     assert run is not None
     assert run.seed is not None
-    settings = asdict(replace(run, method=name, seed=run.seed + number))
-    del settings["checkpoint_every"]
-    ds = smolux.simulate(case.model, **settings, progress=progress)
+    settings = replace(run, method=name, seed=run.seed + number).arguments()
+    ds = smolux.simulate(case.model, **settings, time_limit=run.time_limit, progress=progress)
     compiling = float(ds.attrs["compile_seconds"])
     wall = float(ds.attrs["wall_seconds"]) - compiling
     return Computed(name, ds, wall, compiling, float(ds.attrs["events"]))
