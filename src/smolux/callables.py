@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checks import is_number
 from .errors import InputError, did_you_mean
 from .intervals import Interval
 
@@ -177,7 +178,7 @@ class Function:
 
 def wrong_number(value: Any, where: str) -> list[str]:
     """Return a message unless the value is a finite number."""
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+    if not is_number(value):
         return [f"{where} = {value!r}: must be a number"]
     return [] if np.isfinite(value) else [f"{where} = {value!r}: must be a finite number"]
 

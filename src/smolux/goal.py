@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .checks import whole
 from .errors import InputError, did_you_mean
 
 Float = NDArray[np.float64]
@@ -160,15 +161,6 @@ def make_goal(
     if problems or first is None or most is None:
         return None
     return Goal(name, float(target_error), first, most)
-
-
-def whole(value: Any) -> int | None:
-    """Return a whole number as an int; None if it is none."""
-    try:
-        number = int(value)
-        return number if number == value and not isinstance(value, bool) else None
-    except (TypeError, ValueError, OverflowError):
-        return None
 
 
 def _target(target: Any, orders: Sequence[float], sizes: int, problems: list[str]) -> str:

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .checks import is_number
 from .errors import InputError
 
 Float = NDArray[np.float64]
@@ -151,8 +152,7 @@ class Tabulated(Initial):
 
 def _number(value: Any) -> Any:
     """Return a number as a float, and anything else as it is, to be refused by name."""
-    real = isinstance(value, (int, float, np.number)) and not isinstance(value, (bool, np.bool_))
-    return float(value) if real else value
+    return float(value) if is_number(value) else value
 
 
 def _beyond(least: float, value: Any) -> bool:

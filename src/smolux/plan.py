@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .assembly import inflow, rates_for
+from .checks import is_number, whole
 from .core.state import Grid
 from .errors import InputError, did_you_mean
-from .goal import Goal, make_goal, whole
+from .goal import Goal, make_goal
 from .initial import Initial
 from .methods import METHODS, SizeClass
 from .methods.auto import Auto, choose, unforeseen
@@ -216,8 +217,7 @@ def _subvolumes(subvolumes: Any, remix: Any, particles: int, problems: list[str]
             f"subvolumes = {parts}: each needs {LEAST} particles or more, and particles = "
             f"{particles}: use fewer sub-volumes, or several replicas instead"
         )
-    number = isinstance(remix, (int, float, np.number)) and not isinstance(remix, bool)
-    if not (number and 0 < remix <= 10):
+    if not (is_number(remix) and 0 < remix <= 10):
         problems.append(
             f"remix = {remix!r}: must be a number of collisions for each particle, above 0 and "
             "at most 10"

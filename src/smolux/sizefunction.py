@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .boxes import subdivided
 from .callables import Function
+from .checks import is_number
 from .errors import InputError
 from .formula import Formula, parse
 from .intervals import Interval
@@ -90,7 +91,7 @@ class SizeFunction:
             if expression.names:
                 return cls(given, variable, formula=expression)
             return cls(given, variable, constant=float(expression.evaluate()))
-        if isinstance(given, (int, float, np.number)) and not isinstance(given, bool):
+        if is_number(given):
             return cls(repr(float(given)), variable, constant=float(given))
         if callable(given):
             user = Function.of(given, (variable,), what)

@@ -8,10 +8,10 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checkpoint as checkpoints
+from .checks import is_number
 from .driving import Elsewhere, Progress, Threads
 from .errors import InputError
 from .executors import adapted, cores, workers_of
@@ -225,8 +225,7 @@ def _control_problems(
     if checkpoint is not None:
         problems += _path_problems(checkpoint)
     for name, value in (("checkpoint_every", checkpoint_every), ("time_limit", time_limit)):
-        number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-        if not (number and value > 0) and (name, value) != ("time_limit", None):
+        if not (is_number(value) and value > 0) and (name, value) != ("time_limit", None):
             problems.append(f"{name} = {value!r}: must be a positive number of seconds")
     return problems
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .boxes import subdivided
 from .callables import Function
+from .checks import is_number
 from .errors import InputError
 from .formula import Formula, parse
 from .intervals import Interval
@@ -77,7 +78,7 @@ class TimeFunction:
             else:
                 number = float(expression.evaluate())
                 new = cls(value, (number,), number)
-        elif isinstance(value, (int, float, np.number)) and not isinstance(value, bool):
+        elif is_number(value):
             new = cls(repr(float(value)), (float(value),), float(value))
         elif callable(value):
             user = Function.of(value, ("t",), what)

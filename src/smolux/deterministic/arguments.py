@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import is_number
 from ..errors import InputError, did_you_mean
 from ..model import Model
 from .operator import METHODS
@@ -76,7 +77,7 @@ def check(
         if value not in choices:
             problems.append(f"{what} = {value!r}: unknown{did_you_mean(str(value), choices)}")
     low, high = _TOLERANCES
-    if isinstance(tolerance, bool) or not (_is_number(tolerance) and low <= tolerance <= high):
+    if not (is_number(tolerance) and low <= tolerance <= high):
         problems.append(
             f"tolerance = {tolerance!r}: must be a number from {low:g} to {high:g}; 1e-8 is usual"
         )
@@ -133,12 +134,8 @@ def _default_limit(model: Model) -> int:
     return max(limit, _ROOM * model.initial.largest)
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float, np.number))
-
-
 def _whole(what: str, value: Any, least: int, problems: list[str]) -> int:
-    if not isinstance(value, bool) and _is_number(value) and value == value // 1 >= least:
+    if is_number(value) and value == value // 1 >= least:
         return int(value)
     problems.append(f"{what} = {value!r}: must be a whole number of at least {least}")
     return least

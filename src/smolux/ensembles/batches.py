@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from smolux.assembly import loop_for, rates_for, windows_for
+from smolux.checks import whole
 from smolux.core.rng import streams
 from smolux.core.state import BUDGET, DONE, State
 from smolux.errors import InputError
-from smolux.goal import FEWEST, Goal, make_goal, whole
+from smolux.goal import FEWEST, Goal, make_goal
 from smolux.initial import Sizes
 from smolux.methods.base import Method
 from smolux.model import Model

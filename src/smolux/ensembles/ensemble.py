@@ -11,8 +11,8 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from smolux.analysis.statistics import quantile
+from smolux.checks import whole
 from smolux.executors import cores
-from smolux.goal import whole
 from smolux.methods.base import Method
 from smolux.model import Model
 from smolux.model_dict import model_to_dict

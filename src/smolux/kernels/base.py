@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from smolux.errors import InputError
 from smolux.intervals import Interval
 
+from ..checks import is_number
 from .majorant import Majorant
 
 Float = NDArray[np.float64]
@@ -184,7 +185,7 @@ def check_parameters(kernel: Kernel, **ranges: tuple[float, float]) -> None:
     for f in fields(kernel):
         value = getattr(kernel, f.name)
         where = f"kernel {kernel.name!r}: {f.name} = {value!r}"
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+        if not is_number(value):
             problems.append(f"{where}: must be a number")
         elif not np.isfinite(value):
             problems.append(f"{where}: must be a finite number")
@@ -209,9 +210,7 @@ def check_positive(what: str, **values: float) -> None:
     problems = [
         f"{what}: {key} = {value!r}: must be a positive finite number"
         for key, value in values.items()
-        if isinstance(value, bool)
-        or not isinstance(value, (int, float, np.number))
-        or not (np.isfinite(value) and value > 0)
+        if not (is_number(value) and np.isfinite(value) and value > 0)
     ]
     if problems:
         raise InputError(problems)

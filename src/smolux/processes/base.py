@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..sizefunction import SizeFunction
 from ..timefunction import TimeFunction
 
 Float = NDArray[np.float64]
@@ -119,3 +121,36 @@ class LoneProcess(Process):
     def gain(self, sizes: Float, n: Float, lost: Float) -> Float:
         """Return what appears per time in each size, when of `n` so much vanishes."""
         raise NotImplementedError
+
+
+class Varying:
+    """What processes with a field ``varying`` have in common: it multiplies the rate."""
+
+    name: ClassVar[str]
+    varying: Any
+
+    @property
+    def factor(self) -> TimeFunction:
+        """See `Process.factor`."""
+        return TimeFunction.of(self.varying, f"{self.name}: varying")
+
+
+class RatedBySize(Varying):
+    """What processes of single particles with a ``rate`` by size have in common, beside that."""
+
+    rate: Any
+
+    @cached_property
+    def of_size(self) -> SizeFunction:
+        """The rate as a function of the size."""
+        return SizeFunction.of(self.rate, f"the {self.name} rate")
+
+    @property
+    def law(self) -> Callable[..., Any]:
+        """See `LoneProcess.law`."""
+        return self.of_size.rate
+
+    @property
+    def parameters(self) -> tuple[Any, ...]:
+        """See `LoneProcess.parameters`."""
+        return self.of_size.parameters

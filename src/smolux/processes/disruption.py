@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..checks import is_number
 from ..errors import InputError
 from ..sizefunction import SizeFunction
 from ..timefunction import TimeFunction
@@ -98,7 +99,7 @@ class CollisionalFragmentation(PairProcess):
     def shares(self) -> Float:
         """Probabilities of the sizes 1, 2, ... of a fragment, if all fit."""
         given, largest = self.debris, self.largest or _LARGEST
-        if isinstance(given, (int, float, np.number)) and not isinstance(given, bool):
+        if is_number(given):
             with np.errstate(all="ignore"):
                 values = np.arange(1.0, largest + 1.0) ** -float(given)
         else:

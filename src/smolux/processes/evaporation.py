@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
+from ..checks import is_number
 from ..errors import InputError
-from ..sizefunction import SizeFunction
-from ..timefunction import TimeFunction
-from .base import Float, LoneProcess
+from .base import Float, LoneProcess, RatedBySize
 
 
 def _evaporate(k: int, u: float, sizes: Any, counts: Any) -> int:
@@ -25,7 +23,7 @@ def _evaporate(k: int, u: float, sizes: Any, counts: Any) -> int:
 
 
 @dataclass(frozen=True)
-class Evaporation(LoneProcess):
+class Evaporation(RatedBySize, LoneProcess):
     """Particles lose monomers: ``(k) -> (k - 1) + (1)`` at the rate ``E_k``, for k from 2 on.
 
     ``dn_k/dt = E_{k+1} n_{k+1} - E_k n_k`` for k > 1, and
@@ -54,33 +52,12 @@ class Evaporation(LoneProcess):
     variables: ClassVar[Mapping[str, str]] = {"rate": "k", "varying": "t"}
 
     def __post_init__(self) -> None:
-        TimeFunction.of(self.varying, "evaporation: varying")
-        _ = self.of_size
-
-    @cached_property
-    def of_size(self) -> SizeFunction:
-        """The rate as a function of the size."""
-        return SizeFunction.of(self.rate, "the evaporation rate")
+        _ = self.factor, self.of_size
 
     @property
     def entries(self) -> int:
         """See `Process.entries`."""
         return 2
-
-    @property
-    def factor(self) -> TimeFunction:
-        """See `Process.factor`."""
-        return TimeFunction.of(self.varying, "evaporation: varying")
-
-    @property
-    def law(self) -> Callable[..., Any]:
-        """See `LoneProcess.law`."""
-        return self.of_size.rate
-
-    @property
-    def parameters(self) -> tuple[Any, ...]:
-        """See `LoneProcess.parameters`."""
-        return self.of_size.parameters
 
     def ceiling(self, low: Float, high: Float) -> Float:
         """See `LoneProcess.ceiling`."""
@@ -123,9 +100,7 @@ class Evaporation(LoneProcess):
         problems = [
             f"{name} = {value!r}: must be a finite number, zero or more"
             for name, value in (("ratio", ratio), ("steepness", steepness))
-            if isinstance(value, bool)
-            or not isinstance(value, (int, float, np.number))
-            or not 0.0 <= value < np.inf
+            if not (is_number(value) and 0.0 <= value < np.inf)
         ]
         if problems:
             raise InputError(problems)

@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..checks import is_number
 from ..errors import InputError
 from ..kernels import Constant, formula, from_dict, from_function
 from ..kernels.base import Kernel
-from ..timefunction import TimeFunction
-from .base import Float, LoneProcess
+from .base import Float, LoneProcess, Varying
 
 #: entries of the law that are handled at once; sizes for which all are kept
 _BLOCK, _KEPT = 1 << 22, 1 << 12
@@ -30,7 +30,7 @@ def _split(k: int, u: float, sizes: Any, counts: Any) -> int:
 
 
 @dataclass(frozen=True)
-class Fragmentation(LoneProcess):
+class Fragmentation(Varying, LoneProcess):
     """Particles fall into two: ``(i + j) -> (i) + (j)`` at the rate ``F(i, j)``.
 
     As in ``dn_k/dt = sum_j F(k, j) n_{k+j} - n_k sum_{i+j=k} F(i, j) / 2``. A constant F is random
@@ -58,7 +58,7 @@ class Fragmentation(LoneProcess):
     variables: ClassVar[Mapping[str, str]] = {"rate": "i and j", "varying": "t"}
 
     def __post_init__(self) -> None:
-        TimeFunction.of(self.varying, "fragmentation: varying")
+        _ = self.factor
         if self.pairs.problems():
             raise InputError(
                 [p.replace("kernel", "the fragmentation rate", 1) for p in self.pairs.problems()]
@@ -74,7 +74,7 @@ class Fragmentation(LoneProcess):
             return from_dict(given)
         if isinstance(given, str):
             return formula(given)
-        if isinstance(given, (int, float, np.number)) and not isinstance(given, bool):
+        if is_number(given):
             if not 0.0 < given < np.inf:
                 raise InputError(
                     f"the fragmentation rate = {given!r}: must be a finite number above zero"
@@ -91,11 +91,6 @@ class Fragmentation(LoneProcess):
     def entries(self) -> int:
         """See `Process.entries`."""
         return 2
-
-    @property
-    def factor(self) -> TimeFunction:
-        """See `Process.factor`."""
-        return TimeFunction.of(self.varying, "fragmentation: varying")
 
     @property
     def law(self) -> Callable[..., Any]:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
+from ..checks import is_number
 from ..errors import InputError
-from ..sizefunction import SizeFunction
-from ..timefunction import TimeFunction
-from .base import Float, LoneProcess
+from .base import Float, LoneProcess, RatedBySize
 
 
 def _vanish(k: int, u: float, sizes: Any, counts: Any) -> int:
@@ -20,7 +18,7 @@ def _vanish(k: int, u: float, sizes: Any, counts: Any) -> int:
 
 
 @dataclass(frozen=True)
-class Removal(LoneProcess):
+class Removal(RatedBySize, LoneProcess):
     """Particles leave the system: ``(k) -> nothing``, at a rate or as soon as they are too large.
 
     Parameters
@@ -45,7 +43,7 @@ class Removal(LoneProcess):
     def __post_init__(self) -> None:
         problems = []
         for make in (
-            lambda: TimeFunction.of(self.varying, "removal: varying"),
+            lambda: self.factor,
             lambda: self.of_size,
         ):
             try:
@@ -53,10 +51,9 @@ class Removal(LoneProcess):
             except InputError as error:
                 problems += error.problems
         if self.above is not None:
-            whole = not isinstance(self.above, bool) and isinstance(
-                self.above, (int, float, np.number)
-            )
-            if not (whole and 1 <= self.above < 2**62 and float(self.above).is_integer()):
+            if not (
+                is_number(self.above) and 1 <= self.above < 2**62 and float(self.above).is_integer()
+            ):
                 problems.append(
                     f"removal: above = {self.above!r}: must be a whole number of at least 1"
                 )
@@ -69,26 +66,6 @@ class Removal(LoneProcess):
             )
         if problems:
             raise InputError(problems)
-
-    @cached_property
-    def of_size(self) -> SizeFunction:
-        """The rate as a function of the size."""
-        return SizeFunction.of(self.rate, "the removal rate")
-
-    @property
-    def factor(self) -> TimeFunction:
-        """See `Process.factor`."""
-        return TimeFunction.of(self.varying, "removal: varying")
-
-    @property
-    def law(self) -> Callable[..., Any]:
-        """See `LoneProcess.law`."""
-        return self.of_size.rate
-
-    @property
-    def parameters(self) -> tuple[Any, ...]:
-        """See `LoneProcess.parameters`."""
-        return self.of_size.parameters
 
     def ceiling(self, low: Float, high: Float) -> Float:
         """See `LoneProcess.ceiling`."""

@@ -9,13 +9,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import is_number
 from ..errors import InputError
-from ..timefunction import TimeFunction
-from .base import Float, Process
+from .base import Float, Process, Varying
 
 
 @dataclass(frozen=True)
-class Source(Process):
+class Source(Varying, Process):
     """Particles come in: ``nothing -> (k)`` at the rate ``J_k`` per volume and time.
 
     Parameters
@@ -38,7 +38,7 @@ class Source(Process):
     variables: ClassVar[Mapping[str, str]] = {"varying": "t"}
 
     def __post_init__(self) -> None:
-        TimeFunction.of(self.varying, "source: varying")
+        _ = self.factor
         given = self.rates
         if isinstance(given, Mapping):  # files have sizes as texts
             given = {int(k) if str(k).isdecimal() else k: rate for k, rate in given.items()}
@@ -46,24 +46,17 @@ class Source(Process):
         pairs = list(given.items()) if isinstance(given, Mapping) else [(1, given)]
         problems = [] if pairs else ["source: rates = {}: at least one size is needed"]
         for size, rate in pairs:
-            number = isinstance(rate, (int, float, np.number)) and not isinstance(rate, bool)
-            if not (number and 0.0 <= rate < np.inf):
+            if not (is_number(rate) and 0.0 <= rate < np.inf):
                 problems.append(
                     f"source: the rate {rate!r} of size {size!r}: must be a finite number, zero or "
                     "more"
                 )
-            whole = isinstance(size, (int, float, np.number)) and not isinstance(size, bool)
-            if not (whole and 1 <= size < 2**61 and float(size).is_integer()):
+            if not (is_number(size) and 1 <= size < 2**61 and float(size).is_integer()):
                 problems.append(f"source: the size {size!r}: must be a whole number of at least 1")
         if not problems and not sum(float(rate) for _, rate in pairs) > 0.0:
             problems.append("source: every rate is zero; take the source out")
         if problems:
             raise InputError(problems)
-
-    @property
-    def factor(self) -> TimeFunction:
-        """See `Process.factor`."""
-        return TimeFunction.of(self.varying, "source: varying")
 
     @property
     def table(self) -> tuple[NDArray[np.int64], Float]:

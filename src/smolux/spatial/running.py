@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import is_number
 from ..errors import InputError, Interrupted, did_you_mean
 from .method import Run, SpatialMethod
 from .methods import METHODS
@@ -245,8 +246,7 @@ def _times(times: Any, method: Any, problems: list[str]) -> Float | None:
 
 
 def _number(value: Any) -> bool:
-    real = isinstance(value, (int, float, np.number)) and not isinstance(value, (bool, np.bool_))
-    return real and bool(np.isfinite(value))
+    return is_number(value) and bool(np.isfinite(value))
 
 
 def _default_times(trace: Trace) -> Float:

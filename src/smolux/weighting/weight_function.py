@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..checks import is_number
 from ..errors import InputError
 from ..intervals import Interval
 from ..kernels.base import Kernel
@@ -71,7 +72,7 @@ class WeightFunction(Weighting):
 
     def __post_init__(self) -> None:
         given = self.w
-        if isinstance(given, (int, float, np.number)) and not isinstance(given, bool):
+        if is_number(given):
             if not abs(float(given)) <= _STEEPEST:
                 raise InputError(
                     f"weight function = {given!r}: the power of the size must be a number from "
