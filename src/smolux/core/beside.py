@@ -21,7 +21,7 @@ import numpy as np
 
 from . import rng
 from .compile import cold_piece, piece, user_piece
-from .loop import make_choose_process, note_bad
+from .loop import ROUNDING, make_choose_process, note_bad, schedule, thinned
 from .slots import slot_of
 from .state import (
     BAD_FACTOR,
@@ -30,7 +30,6 @@ from .state import (
     CLOCKS,
     DRAW,
     EVENTS,
-    FIRE,
     FIRST,
     GROW,
     KIND,
@@ -50,7 +49,6 @@ from .state import (
     TIME,
     TOO_LARGE,
     TRIALS,
-    VALUE,
     VOLUME,
     WINDOW,
     WORST_I,
@@ -61,7 +59,6 @@ from .state import (
 CEILING_BITS = 3
 #: candidates looked at before the loop may return without an event
 _PATIENCE = 4096
-_ROUNDING = 1.0 + 1e-12
 
 PAIR, ALONE, SOURCE = 0, 1, 2
 
@@ -200,7 +197,7 @@ def make_lone(lone: Callable[..., Any], rate: Callable[..., Any], pairs: int, co
                     note(s, size, value)
                     return math.nan
                 total += factor_bound(s, windows, r) * value
-            if total > most * _ROUNDING:
+            if total > most * ROUNDING:
                 repair(s, size, total / most * (1.0 + s.clock[RAISED]))
             if rng.uniform(s.rng) * most < total:
                 s.count[LONE], s.count[LONE_SIZE] = one, size
@@ -252,14 +249,7 @@ def make_next_event(draw: Any, lone: Any, seize: Any, pairs: int, lones: int, so
                 if come < wait:
                     wait = come
                     s.count[KIND] = SOURCE
-        pending = s.clock[TIME] + wait
-        if pending >= windows.edges[window + 1] and windows.edges[window + 1] < math.inf:
-            s.clock[TIME] = windows.edges[window + 1]
-            s.count[WINDOW] = window + 1
-            return 0
-        s.clock[PENDING] = pending
-        s.count[PROCESS] = -1
-        s.count[PHASE] = FIRE
+        schedule(s, windows, wait)
         return 0
 
     return next_event
@@ -273,11 +263,7 @@ def make_choice(rate: Any, lone_factor: Any, source_factor: Any, pairs: int, lon
     def kept(s, windows, r, value, share):
         """Thin by the true factor; `share` is uniform below its bound."""
         bound = windows.bounds[s.count[WINDOW], r] + s.clock[CLOCKS + r]
-        if not 0.0 <= value <= bound * _ROUNDING:
-            s.clock[VALUE] = value
-            s.count[PROCESS] = r
-            return -2 if not 0.0 <= value < math.inf else -3
-        return r if share < value else -1
+        return thinned(s, r, value, bound, share)
 
     @cold_piece
     def choose_alone(s, windows, q):

@@ -58,7 +58,21 @@ from .state import (
     Tally,
 )
 
-_ROUNDING = 1.0 + 1e-12
+#: what a value may be above its bound by rounding
+ROUNDING = 1.0 + 1e-12
+
+
+@piece
+def thinned(s, r, value, bound, share):
+    """Keep process `r` by its true factor, or none (-1); `share` is uniform below the bound of it.
+
+    A factor above its bound or without meaning is noted, and a number below -1 returned.
+    """
+    if not 0.0 <= value <= bound * ROUNDING:
+        s.clock[VALUE] = value
+        s.count[PROCESS] = r
+        return -2 if not 0.0 <= value < math.inf else -3
+    return r if share < value else -1
 
 
 def make_choose_process(pairs: int) -> Callable[..., Any]:
@@ -81,12 +95,8 @@ def make_choose_process(pairs: int) -> Callable[..., Any]:
             r += 1
             bound = windows.bounds[window, r] + s.clock[CLOCKS + r]
         value = factor(r, s.clock[PENDING], q.factors)
-        if not 0.0 <= value <= bound * _ROUNDING:
-            s.clock[VALUE] = value
-            s.count[PROCESS] = r
-            return -2 if not 0.0 <= value < math.inf else -3
         # x is uniform below the bound, and serves again
-        return r if x < value else -1
+        return thinned(s, r, value, bound, x)
 
     return choose_process
 
@@ -131,6 +141,21 @@ class Pieces(NamedTuple):
     visit: Any
 
 
+@piece
+def schedule(s, windows, wait):
+    """Note when the next event comes, or go to the next window if that begins before."""
+    window = s.count[WINDOW]
+    pending = s.clock[TIME] + wait
+    if pending >= windows.edges[window + 1] and windows.edges[window + 1] < math.inf:
+        # the exponential law has no memory: go on afresh from the edge
+        s.clock[TIME] = windows.edges[window + 1]
+        s.count[WINDOW] = window + 1
+        return
+    s.clock[PENDING] = pending
+    s.count[PROCESS] = -1
+    s.count[PHASE] = FIRE
+
+
 def make_next_event(draw: Callable[..., Any]) -> Callable[..., Any]:
     """Bind the drawing of the next event: population policy, bounds, waiting time, window."""
 
@@ -143,15 +168,7 @@ def make_next_event(draw: Callable[..., Any]) -> Callable[..., Any]:
             wait = draw(s, w, p, total)
         if math.isnan(wait):
             return BAD_RATE
-        pending = s.clock[TIME] + wait
-        if pending >= windows.edges[window + 1] and windows.edges[window + 1] < math.inf:
-            # the exponential law has no memory: go on afresh from the edge
-            s.clock[TIME] = windows.edges[window + 1]
-            s.count[WINDOW] = window + 1
-            return 0
-        s.clock[PENDING] = pending
-        s.count[PROCESS] = -1
-        s.count[PHASE] = FIRE
+        schedule(s, windows, wait)
         return 0
 
     return next_event
