@@ -40,6 +40,20 @@ def test_physics_is_described_without_numba():
     assert loaded_after(code) <= {"scipy"}
 
 
+def test_loops_load_no_linear_algebra_but_have_it_when_asked():
+    code = (
+        "import sys, numpy as np\n"
+        "from smolux.core.compile import user_piece\n"
+        "import numba.np.arraymath\n"
+        "assert 'scipy.linalg' not in sys.modules\n"
+        "product = user_piece(lambda a: np.dot(a, a))\n"
+        "import numba\n"
+        "called = numba.njit(lambda a: product(a)[0, 0])\n"
+        "assert called(np.full((2, 2), 3.0)) == 18.0"
+    )
+    assert "scipy" in loaded_after(code)
+
+
 @pytest.mark.parametrize("name", smolux.__all__)
 def test_every_public_name_is_there(name):
     assert getattr(smolux, name) is not None

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import importlib
 import itertools
 import os
 import pickle
@@ -54,6 +55,29 @@ _FORMAT = 2
 
 #: compile seconds and cache hits of this process, for reports
 statistics = {"hits": 0, "misses": 0}
+
+
+def _spare_blas() -> None:
+    """Import Numba's functions of arrays without SciPy's linear algebra.
+
+    They look for a BLAS when they are imported, and so load `scipy.linalg` into every process, for
+    products of matrices that no loop here has. A function of the user that has one looks again
+    when it is compiled.
+    """
+    try:
+        from numba.np import linalg
+
+        look = linalg.ensure_blas
+    except (ImportError, AttributeError):  # a later Numba: start as it does
+        return
+    linalg.ensure_blas = lambda: None
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = look
+
+
+_spare_blas()
 
 
 def cache_directory() -> Path | None:
