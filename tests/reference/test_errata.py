@@ -2,7 +2,8 @@
 
 A. Kalinov, A. I. Osinskiy, S. A. Matveev, W. Otieno, N. V. Brilliantov, Direct simulation Monte
 Carlo for new regimes in aggregation-fragmentation kinetics; A. I. Osinsky, Low-rank Monte Carlo for
-Smoluchowski-class equations.
+Smoluchowski-class equations; A. Kolodko, K. Sabelfeld, Stochastic particle methods for Smoluchowski
+coagulation equation.
 """
 
 from __future__ import annotations
@@ -550,3 +551,62 @@ class TestEvaporation:
         n = solve_ivp(change, (0, 5), np.eye(120)[0], rtol=1e-6, atol=1e-12).y[:, -1]
         assert n @ j == pytest.approx(1, abs=1e-6)
         assert n[4:].sum() == pytest.approx(expected, rel=2e-5)
+
+
+class TestBias:
+    """Entry 20: the columns Er are not the bias of direct simulation."""
+
+    @pytest.mark.parametrize(
+        ("kernel", "size", "particles", "time", "expected"),
+        [
+            ("constant", 2, 3300, 20.0, 0.0573),
+            ("constant", 2, 660, 20.0, 0.286),
+            ("additive", 2, 1024, 5.0, 0.276),
+            ("additive", 2, 206, 5.0, 1.39),
+            ("constant", 21, 340, 8.0, 3.53),
+            ("constant", 50, 400, 20.0, 7.70),
+            ("additive", 70, 802, 3.0, 4.73),
+        ],
+    )
+    def test_densities(
+        self, kernel: str, size: int, particles: int, time: float, expected: float
+    ) -> None:
+        scale = 0.5 if kernel == "additive" else 1.0
+        law = exact.finite.law(kernel, particles, scale=scale)
+        solution = (exact.Additive if kernel == "additive" else exact.Constant)(scale=scale)
+        u = solution.densities([time], [size]).item()
+        error = 100 * (law.counts(time, [size]).item() / particles / u - 1)
+        assert abs(error) == pytest.approx(expected, rel=4e-3)
+
+    def test_second_moment(self) -> None:
+        for particles, expected in ((700, 1.48), (350, 2.93)):
+            second = particles - (particles - 1) * math.exp(-20 / particles)
+            assert 100 * (1 - second / 21) == pytest.approx(expected, rel=2e-3)
+
+    def test_norm(self) -> None:
+        k = np.arange(1, 129)
+        u = exact.Constant().densities([20.0], k)[0]
+        mean = exact.finite.law("constant", 128).counts(20.0, k) / 128
+        above = 1 / 11 - u.sum()
+        assert np.abs(mean - u).sum() + above == pytest.approx(0.00408, rel=2e-3)
+
+
+class TestTheorem:
+    """Entry 21: equation (11), with all partitions of eight monomers."""
+
+    def test_derivative(self) -> None:
+        law, n, t, h = exact.finite.law("constant", 8), 8, 0.7, 1e-4
+        states, p = law.partition_pmf(t)
+        u = np.array([[state.count(k) / n for k in range(1, n + 1)] for state in states])
+        sizes = np.arange(1, n + 1)
+        slope = (law.counts(t + h, sizes) - law.counts(t - h, sizes)) / (2 * h * n)
+        gain = np.array([0.5 * (u[:, :k] * u[:, :k][:, ::-1]).sum(axis=1) for k in range(n)]).T
+        lost = u * u.sum(axis=1, keepdims=True)
+        own, even = p @ u, np.zeros(n)
+        even[1::2] = own[: n // 2]  # the mean of U_{l/2}, which odd sizes l do not have
+        correct = p @ (gain - lost) - (0.5 * even - own) / n
+        assert np.abs(slope - correct).max() < 1e-8
+        assert np.abs(slope - (p @ (gain - lost) + own / n)).max() > 1e-3
+        pairs = 0.5 * np.array([k % 2 for k in range(n)])  # of K_ij delta_ij over i + j = l
+        first = pairs - p @ lost
+        assert np.abs(slope - (correct - first / n)).max() > 1e-3
