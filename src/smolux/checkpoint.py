@@ -49,6 +49,7 @@ def _plan_to_dict(plan: Plan) -> dict[str, Any]:
         "method": {"name": plan.method.name, **asdict(plan.method)},  # type: ignore[call-overload]
         "weighting": _weighting_to_dict(plan.weighting),
         "reason": plan.reason,
+        "weighting_reason": plan.weighting_reason,
         "population": plan.population,
         "particles": plan.particles,
         "replicas": plan.replicas,

@@ -112,6 +112,8 @@ def _attributes(plan: Plan, groups: Sequence[Group | Divided]) -> dict[str, obje
         "method_reason": plan.reason or "asked for",
         "method_settings": dict(vars(plan.method)),
         "weighting": plan.weighting.name,
+        "weighting_reason": plan.weighting_reason or "asked for",
+        "weighting_settings": plan.weighting.settings,
         "population": plan.population,
         "initial_particles": plan.particles,
         "subvolumes": plan.subvolumes,

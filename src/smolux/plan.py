@@ -18,13 +18,14 @@ from .core.state import Grid
 from .errors import InputError, did_you_mean
 from .goal import Goal, make_goal
 from .initial import Initial
-from .methods import METHODS, SizeClass
-from .methods.auto import Auto, choose, unforeseen
+from .methods import METHODS, AcceptanceRejection, SizeClass
+from .methods.auto import Auto, choose, costs, unforeseen
 from .methods.base import Method
 from .model import Model
 from .population import POPULATIONS
 from .processes.base import PairProcess
 from .weighting import WEIGHTINGS
+from .weighting.auto import Auto as AutoWeighting
 from .weighting.base import Weighting
 
 #: particles that a sub-volume has at least: with less, fewer sub-volumes are used
@@ -55,6 +56,8 @@ class Plan:
     #: from one mixing to the next
     subvolumes: int = 1
     remix: float = 1.0
+    #: why the weighting was chosen, if it was
+    weighting_reason: str = ""
 
     @cached_property
     def start(self) -> Initial:
@@ -115,6 +118,8 @@ def make_plan(
 ) -> Plan:
     """Check the arguments of `simulate`, all at once; parameters as there.
 
+    A weighting that is to be chosen is left to `smolux.pilot.settled`.
+
     Raises
     ------
     InputError
@@ -125,8 +130,18 @@ def make_plan(
         problems.append(f"model = {model!r}: must be a smolux.Model(kernel=..., ...)")
     found = {
         "method": _chosen("method", method, (*METHODS, Auto), Method, problems),
-        "weighting": _chosen("weighting", weighting, WEIGHTINGS, Weighting, problems),
+        "weighting": _chosen(
+            "weighting", weighting, (*WEIGHTINGS, AutoWeighting), Weighting, problems
+        ),
     }
+    if isinstance(found["weighting"], AutoWeighting):
+        found["weighting"] = AutoWeighting(target)
+        if target == "largest":
+            problems.append(
+                'weighting = "auto", target = "largest": the largest of the simulated particles is '
+                "another quantity with each weighting; name a density or a moment as target, or a "
+                "weighting"
+            )
     if population not in POPULATIONS:
         problems.append(
             f"population = {population!r}: unknown"
@@ -164,31 +179,46 @@ def make_plan(
     )
     plan.start  # noqa: B018  initial sizes that cannot be weighted are refused here
     if isinstance(plan.method, Auto):
-        plan = _with_method(plan)
+        plan = with_method(plan)
     check_memory(plan)
     return plan
 
 
-def _with_method(plan: Plan) -> Plan:
+def with_method(plan: Plan) -> Plan:
     """Let the method be chosen."""
     if plan.subvolumes > 1:
         return replace(plan, method=SizeClass(), reason="it mixes sub-volumes in the least time")
-    initial, processes = plan.model.initial, plan.model.processes
-    chosen = unforeseen(processes)
-    if chosen is not None:
-        return replace(plan, method=chosen[0], reason=chosen[1])
+    chosen = unforeseen(plan.model.processes) or choose(*_circumstances(plan))
+    return replace(plan, method=chosen[0], reason=chosen[1])
+
+
+def event_cost(plan: Plan) -> float:
+    """Estimate what an event costs, relative to other weightings of the same run.
+
+    By the method of the plan, or by the best one if it was chosen. One where all weightings are
+    alike or nothing is known.
+    """
+    known = plan.subvolumes == 1 and unforeseen(plan.model.processes) is None
+    if not known or not (plan.reason or isinstance(plan.method, AcceptanceRejection)):
+        return 1.0
+    found, _ = costs(*_circumstances(plan))
+    return min(found.values()) if plan.reason else found[AcceptanceRejection]
+
+
+def _circumstances(plan: Plan) -> tuple[Any, ...]:
+    """Return what the estimate of costs takes."""
+    initial = plan.model.initial
     sizes, counts = initial.sample(min(plan.particles, 1000), 0.5)
     mass = float(sizes @ counts)
     means = mass / float(counts.sum()), float(sizes.astype(float) ** 2 @ counts) / mass
-    method, reason = choose(
+    return (
         rates_for(plan.model, plan.weighting),
-        [p for p in processes if isinstance(p, PairProcess)],
+        [p for p in plan.model.processes if isinstance(p, PairProcess)],
         plan.particles,
         initial.total,
         means,
         plan.times[-1],
     )
-    return replace(plan, method=method, reason=reason)
 
 
 def _chosen(what: str, value: Any, registry: Sequence[Any], kind: type, problems: list[str]) -> Any:

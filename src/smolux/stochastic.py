@@ -17,6 +17,7 @@ from .errors import InputError
 from .executors import adapted, cores, workers_of
 from .methods.base import Method
 from .model import Model
+from .pilot import settled
 from .plan import make_plan
 from .subvolumes import start
 from .weighting.base import Weighting
@@ -65,7 +66,9 @@ def simulate(
         event and chooses, and the attributes ``method`` and ``method_reason`` of the result say
         what and why.
     weighting : str or Weighting
-        What one simulated particle stands for, see `smolux.weighting.WEIGHTINGS`.
+        What one simulated particle stands for, see `smolux.weighting.WEIGHTINGS`; "auto" chooses
+        the one that is most efficient for the `target` in a short pilot, and the attributes
+        ``weighting``, ``weighting_settings`` and ``weighting_reason`` say what and why.
     population : {"doubling", "fixed-volume", "none"}
         Double the volume, every particle once more, when half of the initial number are left; or
         do not.
@@ -102,10 +105,10 @@ def simulate(
         interval of the `target` over its mean is at most this at every output time. The result is
         that of a run with so many replicas from the start, bit for bit.
     target : str
-        ``"number_density"``, ``"largest"``, ``"M2"`` (any of the `orders`) or ``"n_5"`` (any size).
+        What `target_error` and ``weighting="auto"`` are about: ``"number_density"``,
+        ``"largest"``, ``"M2"`` (any of the `orders`) or ``"n_5"`` (any size).
     max_replicas : int
         Where adding replicas ends; then the result has a warning.
-
     subvolumes : int
         Parts of each replica that are simulated side by side, one on each core, and mixed again
         and again: for one large system. Each has at least 1000 particles. What this adds to the
@@ -154,6 +157,7 @@ def simulate(
         raise InputError([*error.problems, *problems]) from None
     if problems:
         raise InputError(problems)
+    plan = settled(plan)
     if executor is not None and not isinstance(executor, ThreadPoolExecutor):
         return Elsewhere(plan, executor, progress, workers_of(executor)).finish()
     workers = max(1, cores() // plan.subvolumes)

@@ -114,7 +114,9 @@ def read_run(content: Any, problems: Problems) -> Run | None:
         "replicas": table.integer("replicas", Run.replicas, 1, 1_000_000),
         "seed": table.integer("seed", None, 0),
         "method": table.choice("method", Run.method, ["auto", *(m.name for m in METHODS)]),
-        "weighting": table.choice("weighting", Run.weighting, [w.name for w in WEIGHTINGS]),
+        "weighting": table.choice(
+            "weighting", Run.weighting, ["auto", *(w.name for w in WEIGHTINGS)]
+        ),
         "exponent": _exponent(table),
         "population": table.choice("population", Run.population, list(POPULATIONS)),
         "orders": read_orders(table),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..case import Case, Parallel
+from ..case import Case, Parallel, Run
 from ..case.physics import model_tables
 from ..case.settings import as_table
 from ..case.write import value
@@ -63,6 +63,10 @@ def description(case: Case) -> list[str]:
             f"simulate     {run.method}, {run.particles} particles, {run.replicas} replicas, "
             f"{run.population}, seed {'new each time' if run.seed is None else run.seed}"
         )
+        if run.weighting != Run.weighting:
+            power = "" if run.exponent is None else f", exponent {run.exponent:g}"
+            power = f", for {run.target}" if run.weighting == "auto" else power
+            lines.append(f"weighting    {run.weighting}{power}")
         if run.target_error is not None:
             lines.append(
                 f"until        the 95 % interval of {run.target} is ±{100 * run.target_error:g} %, "

@@ -16,6 +16,8 @@ from ..case.settings import Run
 from ..errors import Interrupted
 from ..executors import cores
 from ..initial import Sizes
+from ..pilot import settled
+from ..plan import make_plan
 
 Float = NDArray[np.float64]
 
@@ -100,7 +102,21 @@ class Estimate:
     warnings: list[str] = field(default_factory=list)
 
 
-def _once(case: Case, particles: int) -> tuple[Any, bool]:
+def weighted(case: Case) -> Any:
+    """Return the weighting of a case; chosen, if it is to be."""
+    run = case.run
+    assert run is not None
+    if run.weighting != "auto":
+        return run.weighted()
+    plan = make_plan(
+        case.model, run.times, run.method, "auto", run.population, run.particles, 1,
+        _SEED if run.seed is None else run.seed, run.orders, run.sizes, 1, False,
+        target=run.target,
+    )  # fmt: skip
+    return settled(plan).weighting
+
+
+def _once(case: Case, particles: int, weighting: Any) -> tuple[Any, bool]:
     """Run one pilot; what it reached, and whether that is the end."""
     run = case.run
     assert run is not None
@@ -116,7 +132,7 @@ def _once(case: Case, particles: int) -> tuple[Any, bool]:
 
     try:
         ds = smolux.simulate(
-            case.model, times, method=run.method, weighting=run.weighted(), particles=particles,
+            case.model, times, method=run.method, weighting=weighting, particles=particles,
             replicas=1, seed=_SEED, orders=(0,), sizes=1, progress=halt,
         )  # fmt: skip
     except Interrupted as stop:
@@ -127,9 +143,9 @@ def _once(case: Case, particles: int) -> tuple[Any, bool]:
 def pilot(case: Case) -> Pilot:
     """Run a case with few particles, more of them as long as that takes next to no time."""
     assert case.run is not None
-    particles = min(_FIRST, case.run.particles)
+    particles, weighting = min(_FIRST, case.run.particles), weighted(case)
     while True:
-        ds, done = _once(case, particles)
+        ds, done = _once(case, particles, weighting)
         seconds = float(ds.attrs["compute_seconds"])
         if not done or seconds > _SHORT or particles == case.run.particles:
             break

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import tempfile
 import warnings
@@ -169,6 +170,7 @@ def _check_plan(plan: Any, case: Case) -> None:
     begun = {
         "seed": plan.entropy,
         "method": "auto" if plan.reason else plan.method.name,
+        "weighting": "auto" if plan.weighting_reason else plan.weighting,
         "replicas": plan.replicas if goal is None else goal.first,
         "target_error": None if goal is None else goal.error,
         # without a goal they say nothing
@@ -178,7 +180,7 @@ def _check_plan(plan: Any, case: Case) -> None:
     same = model_to_dict(plan.model) == model_to_dict(case.model)
     for name, value in run.arguments().items():
         found = begun[name] if name in begun else getattr(plan, name)
-        same = same and getattr(found, "name", found) == value
+        same = same and value in (found, getattr(found, "name", found))
     if not same:
         raise InputError(_CHANGED)
 
@@ -213,6 +215,9 @@ def _simulate(
     )
     if case.run is not None and case.run.method == "auto":
         say(f"method {ds.attrs['method']}: {ds.attrs['method_reason']}")
+    if case.run is not None and case.run.weighting == "auto":
+        settings = "".join(f" {v}" for v in json.loads(ds.attrs["weighting_settings"]).values())
+        say(f"weighting {ds.attrs['weighting']}{settings}: {ds.attrs['weighting_reason']}")
     stopper.patient = False
     stopper.check()
     return ds

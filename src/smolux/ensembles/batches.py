@@ -25,6 +25,7 @@ from smolux.initial import Sizes
 from smolux.methods.base import Method
 from smolux.model import Model
 from smolux.observe import observable
+from smolux.pilot import settled
 from smolux.plan import Plan, make_plan
 from smolux.replicas import Group, empty_state, initial_populations
 from smolux.weighting.base import Weighting
@@ -172,11 +173,13 @@ def make_sampler(
         plan = make_plan(
             model, times, method, weighting, population, particles, 1, seed, orders,
             min(max(sizes, min(_SIZES, whole(particles) or 1)), _LARGEST), 1, False,
+            target=names[0] if names and not problems else "number_density",
         )  # fmt: skip
     except InputError as error:
         raise InputError([*problems, *error.problems]) from None
     if problems or number is None:
         raise InputError(problems)
+    plan = settled(plan)
     row = len(plan.times) * (plan.sizes + 64)
     together = min(_TOGETHER, _PARTICLES // plan.particles, _OBSERVED // row, number // _FEWEST)
     return Sampler(replace(plan, replicas=max(1, together)), names)

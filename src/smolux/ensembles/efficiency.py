@@ -157,9 +157,12 @@ def efficiency(
         "observable": names,
         "time": np.array(samplers[0].plan.times),
     }
-    chosen = [s.plan.method.name for s in samplers]
-    given = described(samplers[0], int(replicas)) | {"reference": source, "methods": chosen}
-    for one in ("method", "method_reason", "weighting", "weighting_settings"):
+    chosen = {
+        "methods": [s.plan.method.name for s in samplers],
+        "weightings": [_label(s.plan.weighting) for s in samplers],
+    }
+    given = described(samplers[0], int(replicas)) | {"reference": source} | chosen
+    for one in ("method", "method_reason", "weighting", "weighting_reason", "weighting_settings"):
         del given[one]
     ds = xr.Dataset(variables, coordinates, provenance("Efficiency of methods", given))
     return labelled(ds, _LONG_NAMES)

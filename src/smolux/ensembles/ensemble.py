@@ -126,7 +126,7 @@ def ensemble(
         ``"number_density"``, ``"largest"``, ``"M2"`` (the moment of any order) or ``"n_50"`` (the
         density of any size).
     method, weighting, population, particles
-        As for `simulate`.
+        As for `simulate`. With ``weighting="auto"`` the first observable is what it is chosen for.
     replicas : int
         Independent runs, 2 or more.
     seed : int, optional
@@ -198,7 +198,8 @@ def described(sampler: Sampler, replicas: int) -> dict[str, Any]:
         "method": plan.method.name,
         "method_reason": plan.reason or "asked for",
         "weighting": plan.weighting.name,
-        "weighting_settings": dict(vars(plan.weighting)),
+        "weighting_reason": plan.weighting_reason or "asked for",
+        "weighting_settings": plan.weighting.settings,
         "population": plan.population,
         "initial_particles": plan.particles,
         "replicas": replicas,

@@ -188,15 +188,15 @@ def unforeseen(processes: Sequence[Process]) -> tuple[Method, str] | None:
     )
 
 
-def choose(
+def costs(
     rates: Rates,
     processes: Sequence[PairProcess],
     particles: int,
     density: float,
     sizes: tuple[float, float],
     end: float,
-) -> tuple[Method, str]:
-    """Choose a method and say why.
+) -> tuple[dict[type[Method], float], float]:
+    """Estimate what an event costs by the methods that may be chosen.
 
     Parameters
     ----------
@@ -214,23 +214,45 @@ def choose(
 
     Returns
     -------
+    costs : dict
+        Nanoseconds for each method.
+    candidates : float
+        Of acceptance-rejection for an event.
+    """
+    candidates = candidates_per_event(rates, processes, particles, density, sizes, end)
+    found: dict[type[Method], float] = {
+        AcceptanceRejection: _EVENT + _TRIAL * candidates,
+        SizeClass: _CLASS_EVENT + _CLASS_FEW / particles,
+    }
+    known = rates.majorant
+    if known is not None and len(known.terms) == 1 and known.least == 1.0:
+        found[LowRank] = _ONE_PRODUCT
+    return found, candidates
+
+
+def choose(
+    rates: Rates,
+    processes: Sequence[PairProcess],
+    particles: int,
+    density: float,
+    sizes: tuple[float, float],
+    end: float,
+) -> tuple[Method, str]:
+    """Choose a method and say why; parameters as for `costs`.
+
+    Returns
+    -------
     method : Method
     reason : str
     """
-    candidates = candidates_per_event(rates, processes, particles, density, sizes, end)
-    plain = _EVENT + _TRIAL * candidates
-    classes = _CLASS_EVENT + _CLASS_FEW / particles
-    costs: dict[type[Method], float] = {AcceptanceRejection: plain, SizeClass: classes}
-    known = rates.majorant
-    if known is not None and len(known.terms) == 1 and known.least == 1.0:
-        costs[LowRank] = _ONE_PRODUCT
+    found, candidates = costs(rates, processes, particles, density, sizes, end)
     estimate = "more than a million" if candidates > 1e6 else f"about {candidates:.2g}"
     others = "".join(
         f"; the {method.title} method some {cost:.2g} ns"
-        for method, cost in costs.items()
+        for method, cost in found.items()
         if method is not AcceptanceRejection
     )
-    return min(costs, key=costs.__getitem__)(), (
+    return min(found, key=found.__getitem__)(), (
         f"acceptance-rejection would need {estimate} candidates an event, some "
-        f"{min(plain, 1e9):.2g} ns{others}"
+        f"{min(found[AcceptanceRejection], 1e9):.2g} ns{others}"
     )

@@ -57,6 +57,11 @@ class Weighting:
         return ()
 
     @property
+    def settings(self) -> dict[str, Any]:
+        """What a result says of it beside its name."""
+        return {}
+
+    @property
     def rigorous(self) -> bool:
         """Whether bounds of the simulated rate are proved where those of the kernel are."""
         return True

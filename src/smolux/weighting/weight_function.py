@@ -112,6 +112,11 @@ class WeightFunction(Weighting):
         return self._law.parameters if self.exponent is None else (self.exponent,)
 
     @property
+    def settings(self) -> dict[str, Any]:
+        """See `Weighting.settings`."""
+        return {"w": self._law.text if self.exponent is None else self.exponent}
+
+    @property
     def rigorous(self) -> bool:
         """See `Weighting.rigorous`."""
         return self.exponent is not None or self._law.rigorous

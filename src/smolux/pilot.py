@@ -1,0 +1,202 @@
+"""The choice of a weighting by what it is worth for an observable, from a short pilot.
+
+Weightings change how many simulated particles there are of which size, and how many events. Both
+are seen in a few replicas of a small system: the efficiency ``1 / (cost variance)`` of one
+weighting over that of another hardly depends on the number of particles. Cost is the number of
+events times the estimate of what one costs by which methods are chosen, not the time that the pilot
+took: the same arguments give the same choice on any machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .core.state import EVENTS, TRIALS
+from .goal import Goal
+from .methods import SizeClass
+from .observe import observable
+from .plan import Plan, check_memory, event_cost, with_method
+from .replicas import Group
+from .weighting import MassFlow, Number, WeightFunction
+from .weighting.auto import Auto
+from .weighting.base import Weighting
+
+Float = NDArray[np.float64]
+
+#: powers of the size that are tried; the first is preferred to those that are hardly better
+_POWERS = (0.0, 0.5, 1.0, 1.5)
+#: how many times as efficient another one must be: with so many replicas less may be chance
+_WORTH = 1.3
+#: particles of a replica, replicas that are run together, and at most
+_PARTICLES, _TOGETHER, _REPLICAS = 500, 32, 256
+#: output times, sizes that are counted one by one if none is asked for, and numbers observed
+_TIMES, _SIZES, _OBSERVED = 16, 128, 4_000_000
+#: what powers of the size add to the cost of an event, as a factor
+_POWER_COST = 1.7
+#: candidates and events for each power at most
+_EFFORT = 10_000_000
+#: clusters of one size that must be seen for a variance; below, it is taken to be that of a count
+_SEEN = 100
+#: which random numbers the pilots have
+_STREAM = 5
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """What a pilot with one weighting gives.
+
+    Attributes
+    ----------
+    values : ndarray of shape (R, T)
+        The observable.
+    present : ndarray of shape (R, T)
+        Simulated particles that a density of one would be.
+    cost : float
+        Of a replica, up to a factor.
+    """
+
+    weighting: Weighting
+    values: Float
+    present: Float
+    cost: float
+
+
+def settled(plan: Plan) -> Plan:
+    """Replace a weighting that is still to be chosen; a plan with another is returned as it is."""
+    if not isinstance(plan.weighting, Auto):
+        return plan
+    goal = Goal(plan.weighting.target, 0.5, 2, 2)
+    trials = list(_trials(plan, goal))
+    if len(trials) == len(_POWERS):
+        weighting, reason = _compared(goal, trials)
+    else:
+        weighting, reason = _by_rule(plan, goal)
+    chosen = replace(plan, weighting=weighting, weighting_reason=reason)
+    chosen = with_method(chosen) if plan.reason else chosen
+    check_memory(chosen)
+    return chosen
+
+
+def named(power: float) -> Weighting:
+    """Return the weighting by a power of the size, the one compiled for it if there is one."""
+    return {0.0: Number(), 1.0: MassFlow()}.get(power) or WeightFunction(power)
+
+
+def _trials(plan: Plan, goal: Goal) -> Iterator[_Trial]:
+    """Run the pilots, as long as they come to their ends."""
+    seeds = np.random.SeedSequence(plan.entropy, spawn_key=(0, _STREAM)).generate_state(
+        len(_POWERS), np.uint64
+    )
+    some = np.linspace(0, len(plan.times) - 1, min(len(plan.times), _TIMES)).astype(int)
+    small = replace(
+        plan,
+        method=SizeClass(),
+        particles=min(plan.particles, _PARTICLES),
+        times=tuple(plan.times[k] for k in some),
+        orders=(goal.order or 0.0,),
+        sizes=max(goal.size or 1, min(plan.sizes, _SIZES)),
+        bins_per_octave=1,
+        distribution=False,
+        goal=goal,
+        subvolumes=1,
+    )
+    for power, seed in zip(_POWERS, seeds.tolist(), strict=True):
+        # one compiled loop for all: the power is data
+        given = replace(small, weighting=WeightFunction(power), entropy=seed)
+        trial = _trial(plan, given, named(power))
+        if trial is None:
+            return
+        yield trial
+
+
+def _trial(plan: Plan, small: Plan, weighting: Weighting) -> _Trial | None:
+    """Run one pilot; None if it takes too long."""
+    values, present, events, effort = [], [], 0, 0
+    together = max(1, min(_TOGETHER, _OBSERVED // (len(small.times) * small.sizes)))
+    for first in range(0, _REPLICAS, together):
+        group = Group.start(small, first, together)
+        group.advance(lambda group=group: _effort(group) > _EFFORT)  # type: ignore[misc]
+        effort += _effort(group)
+        # that it came to its end in the last slice says something of the machine, and is left out
+        if _effort(group) > _EFFORT:
+            return None
+        values.append(observable(small, [group])[0])
+        present.append(group.tally.scalars[..., 3])
+        events += int(group.state.events.sum())
+        if effort > _EFFORT // 2:
+            break
+    assert small.goal is not None
+    if small.goal.size is not None:
+        weight = weighting.weights(np.array([float(small.goal.size)]))[0]
+        present = [weight * volume for volume in present]
+    cost = events / (together * len(values)) * event_cost(replace(plan, weighting=weighting))
+    cost *= _POWER_COST if isinstance(weighting, WeightFunction) else 1.0
+    return _Trial(weighting, np.concatenate(values), np.concatenate(present), cost)
+
+
+def _effort(group: Group) -> int:
+    return int(group.state.count[:, (TRIALS, EVENTS)].sum())
+
+
+def _compared(goal: Goal, trials: list[_Trial]) -> tuple[Weighting, str]:
+    """Choose the weighting that is worth most."""
+    worst = _scatter(goal, trials).max(axis=1)
+    replicas = min(len(trial.values) for trial in trials)
+    pilots = f"in pilots of {replicas} replicas or more"
+    if not worst.max() > 0.0:
+        return trials[0].weighting, f"{goal.target} has no scatter {pilots}"
+    with np.errstate(divide="ignore"):
+        worth = 1.0 / (worst * [trial.cost for trial in trials])
+        ratio = worth / worth[0]
+    best = int(np.argmax(_WORTH * worth >= worth.max()))
+    others = ", ".join(
+        f"{_label(trial.weighting)} {r:.2g}" for trial, r in zip(trials[1:], ratio[1:], strict=True)
+    )
+    return trials[best].weighting, (
+        f"efficiency for {goal.target} over that of number {pilots}: {others}"
+    )
+
+
+def _scatter(goal: Goal, trials: list[_Trial]) -> Float:
+    """Return the variance over the squared mean, for each trial and time.
+
+    That of a size that is hardly seen is taken to be that of a count: one over the number that is
+    expected, from the density that all trials together have seen. Times at which none has seen any
+    are left out, unless all are so.
+    """
+    found = []
+    count = np.sum([(trial.values * trial.present).sum(axis=0) for trial in trials], axis=0)
+    density = np.maximum(count, 1.0) / sum(trial.present.sum(axis=0) for trial in trials)
+    for trial in trials:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = trial.values.mean(axis=0)
+            spread = trial.values.var(axis=0, ddof=1)
+            scatter = np.where(spread > 0.0, spread / mean**2, 0.0)
+            if goal.size is not None:
+                rare = (trial.values * trial.present).sum(axis=0) < _SEEN
+                expected = 1.0 / (density * trial.present.mean(axis=0))
+                scatter = np.where(rare, expected, scatter)
+        found.append(scatter)
+    seen = count > 0.0 if goal.size is not None and count.any() else np.ones(len(count), bool)
+    return np.array(found)[:, seen]
+
+
+def _label(weighting: Weighting) -> str:
+    if isinstance(weighting, WeightFunction):
+        return f"l^{weighting.exponent:g}"
+    return weighting.name
+
+
+def _by_rule(plan: Plan, goal: Goal) -> tuple[Weighting, str]:
+    """Choose by the name of the observable alone."""
+    sizes, counts = plan.model.initial.sample(1000, 0.5) if plan.model.initial.total else (1, 1)
+    mean = float(np.sum(sizes * counts) / np.sum(counts))
+    large = (goal.order or 0.0) > 1.0 or (goal.size or 0.0) > mean
+    return (MassFlow() if large else Number()), (
+        f"a pilot takes more than {_EFFORT:g} events; by rule mass-flow for moments of an order "
+        "above 1 and sizes above the mean one at the start, number for all else"
+    )
