@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from .core import beside, rng
+from .core.burst import make_burst
 from .core.compile import digest, piece, user_piece
-from .core.loop import make_fire, make_loop, make_next_event, tally_one
+from .core.loop import make_fire, make_loop, make_next_event
+from .core.record import tally_one
 from .core.slots import slot_edges
 from .core.state import LIMIT, Parameters, Windows
 from .core.weights import (
@@ -169,7 +171,10 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
     random = weight is not None or any(type(p).random for p in pairs)
     if not lone and not sources:
         fire = make_fire(pieces.pair, pieces.update, outcome, factor, random, len(pairs))
-        return make_loop(pieces, make_next_event(pieces.draw), fire)
+        burst = None
+        if pieces.burst is not None and not random:
+            burst = make_burst(pieces.burst, outcome, len(pairs))
+        return make_loop(pieces, make_next_event(pieces.draw, burst), fire)
     about = [beside.Lone(p.law, type(p).outcome, p.least, p.splits, p.opens) for p in lone]
     shape = len(pairs), len(lone), len(sources)
     rate = beside.bind_rates(about)

@@ -8,11 +8,15 @@ import re
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 import runs
 
 import smolux as sx
+from smolux import assembly
+from smolux.core.state import REPAIRS
 from smolux.errors import InputError
+from smolux.replicas import Group
 from smolux.timefunction import TimeFunction
 
 #: loops of the others compile long
@@ -130,6 +134,26 @@ def test_bounds_that_do_not_hold_are_repaired(method: str, bounds: Any) -> None:
     # repaired, not ignored: the many collisions of this size take place
     a, b, plain = (float(x["n"].sel(size=21).mean()) for x in (ds, right, simulate(1.0, method)))
     assert abs(a - b) < 0.5 * (plain - b) + 1e-12
+
+
+def test_events_in_a_row_are_those_of_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With repairs, shattering and doubling on the way, whole states are the same bit for bit."""
+    method = sx.methods.AcceptanceRejection
+    bind, kernel = method.bind, sx.kernels.from_function(odd, value=8.0, bounds=below_one)
+    physics = sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(0.05)])
+    states = []
+    for burst in (True, False):
+        if not burst:
+            plain = staticmethod(lambda *given: bind(*given)._replace(burst=None))
+            monkeypatch.setattr(method, "bind", plain)
+            monkeypatch.setattr(assembly, "_loops", {})
+        group = Group.start(runs.plan(physics, [3.0, 30.0], method.name, particles=2000), 0, 2)
+        group.advance(lambda: False)
+        states.append(group.state)
+    assert states[0].count[0, REPAIRS] > 0
+    assert (states[0].events > 100).all()
+    for name, values in states[0]._asdict().items():
+        np.testing.assert_array_equal(values, getattr(states[1], name), name)
 
 
 # --- rates of processes --------------------------------------------------------------------------

@@ -221,7 +221,7 @@ def make_next_event(draw: Any, lone: Any, seize: Any, pairs: int, lones: int, so
         return total * s.clock[VOLUME]
 
     @piece
-    def next_event(s, w, windows, p, q):
+    def next_event(s, w, windows, p, q, until, stop):
         window = s.count[WINDOW]
         s.count[KIND] = PAIR
         s.count[FIRST] = -1

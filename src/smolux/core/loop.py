@@ -16,7 +16,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from . import rng
+from .burst import Burst
 from .compile import cold_piece, entry, piece
+from .record import make_record
 from .state import (
     BAD_FACTOR,
     BAD_RATE,
@@ -128,6 +130,8 @@ class Pieces(NamedTuple):
     visit : ``visit(s, w, t, grid, p)``
         Call the `tally` that `Method.bind` was given for the particles present, and return the
         largest size.
+    burst : Burst or None
+        How the method carries out plain events in a row, if it can.
     """
 
     view: Any
@@ -139,6 +143,7 @@ class Pieces(NamedTuple):
     lone: Any
     seize: Any
     visit: Any
+    burst: Burst | None = None
 
 
 @piece
@@ -156,11 +161,24 @@ def schedule(s, windows, wait):
     s.count[PHASE] = FIRE
 
 
-def make_next_event(draw: Callable[..., Any]) -> Callable[..., Any]:
-    """Bind the drawing of the next event: population policy, bounds, waiting time, window."""
+def make_next_event(
+    draw: Callable[..., Any], burst: Callable[..., Any] | None = None
+) -> Callable[..., Any]:
+    """Bind the drawing of the next event: waiting time and window, after a burst of plain ones."""
+    if burst is not None:
+        draw_next = make_next_event(draw)
+
+        @piece
+        def next_event_after_burst(s, w, windows, p, q, until, stop):
+            reason = burst(s, w, windows, p, q, until, stop)
+            if reason != 0 or s.count[PHASE] == FIRE:
+                return reason
+            return draw_next(s, w, windows, p, q, until, stop)
+
+        return next_event_after_burst
 
     @piece
-    def next_event(s, w, windows, p, q):
+    def next_event(s, w, windows, p, q, until, stop):
         window = s.count[WINDOW]
         total = windows.total[window] + s.clock[EXCESS]
         wait = math.inf
@@ -234,49 +252,6 @@ def make_fire(
     return fire
 
 
-@piece
-def find_bin(grid, size):
-    """Bin of a size: the last edge at or below it."""
-    low, high = 0, grid.edges.shape[0]
-    while high - low > 1:
-        middle = (low + high) // 2
-        if grid.edges[middle] <= size:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@cold_piece
-def tally_one(t, grid, size, count, p):
-    """Add `count` particles of one size to an observation."""
-    if size < t.counts.shape[0]:
-        t.counts[size] += count
-        return
-    t.bins[find_bin(grid, size)] += count
-    x = float(size)
-    for o in range(grid.orders.shape[0]):
-        t.sums[o] += count * x ** grid.orders[o]
-
-
-def make_record(visit: Callable[..., Any]) -> Callable[..., Any]:
-    """Bind the recording of an observation."""
-
-    @cold_piece
-    def record(s, w, t, grid, time, p):
-        t.scalars[0] = time
-        t.scalars[1] = s.count[PARTICLES]
-        t.scalars[2] = s.count[EVENTS]
-        t.scalars[3] = s.clock[VOLUME]
-        t.scalars[4] = visit(s, w, t, grid, p)
-        t.scalars[5] = s.clock[MASS_IN]
-        t.scalars[6] = s.clock[MASS_OUT]
-        for r in range(s.events.shape[0]):
-            t.events[r] = s.events[r]
-
-    return record
-
-
 def make_loop(
     pieces: Pieces, next_event: Callable[..., Any], fire: Callable[..., Any]
 ) -> Callable[..., Any]:
@@ -318,7 +293,8 @@ def make_loop(
                     return reason
                 if s.count[TRIALS] + s.count[EVENTS] >= stop:
                     return BUDGET
-                reason = next_event(s, w, windows, p, q)
+                until = grid.times[min(s.count[NEXT], grid.times.shape[0] - 1)]
+                reason = next_event(s, w, windows, p, q, until, stop)
                 if reason != 0:
                     return reason
                 if s.count[PHASE] == DRAW:

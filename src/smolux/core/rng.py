@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from .compile import piece
+from .compile import cold_piece, piece
 from .seeds import spawned
 
 _R17, _R23, _R45 = np.uint64(17), np.uint64(23), np.uint64(45)
@@ -20,6 +20,7 @@ _R19, _R41 = np.uint64(19), np.uint64(41)
 _S11 = np.uint64(11)
 _TO_UNIT = 2.0**-53
 _LAYER = np.uint64(255)
+_ONE = np.uint64(1)
 
 
 def streams(entropy: int, first: int, count: int) -> np.ndarray:
@@ -36,11 +37,10 @@ def stream(entropy: int, *key: int) -> np.ndarray:
 
 
 @piece
-def bits(s):
-    """64 random bits."""
-    s0, s1, s2, s3 = s[0], s[1], s[2], s[3]
+def step(s0, s1, s2, s3):
+    """64 random bits, and the state after them."""
     x = s0 + s3
-    result = ((x << _R23) | (x >> _R41)) + s0
+    word = ((x << _R23) | (x >> _R41)) + s0
     t = s1 << _R17
     s2 ^= s0
     s3 ^= s1
@@ -48,14 +48,26 @@ def bits(s):
     s0 ^= s3
     s2 ^= t
     s3 = (s3 << _R45) | (s3 >> _R19)
-    s[0], s[1], s[2], s[3] = s0, s1, s2, s3
-    return result
+    return word, s0, s1, s2, s3
+
+
+@piece
+def bits(s):
+    """64 random bits."""
+    word, s[0], s[1], s[2], s[3] = step(s[0], s[1], s[2], s[3])
+    return word
+
+
+@piece
+def unit(word):
+    """Uniform number in [0, 1) of 64 random bits, a multiple of 2**-53."""
+    return np.int64(word >> _S11) * _TO_UNIT
 
 
 @piece
 def uniform(s):
     """Uniform number in [0, 1), a multiple of 2**-53."""
-    return np.int64(bits(s) >> _S11) * _TO_UNIT
+    return unit(bits(s))
 
 
 @piece
@@ -79,17 +91,32 @@ _X, _Y = _ziggurat()
 _EDGE = float(_X[1])
 
 
-@piece
-def exponential(s):
-    """Exponential number of mean 1."""
+@cold_piece
+def outside(s, k, x):
+    """Exponential number of mean 1, given that `x` in layer `k` is not surely below the curve."""
     shift = 0.0
     while True:
-        word = bits(s)
-        k = np.int64(word & _LAYER)
-        x = np.int64(word >> _S11) * _TO_UNIT * _X[k]
-        if x < _X[k + 1]:
-            return shift + x
         if k == 0:  # beyond the last layer the law repeats itself
             shift += _EDGE
         elif _Y[k] + uniform(s) * (_Y[k + 1] - _Y[k]) < math.exp(-x):
             return shift + x
+        word = bits(s)
+        k = np.int64(word & _LAYER)
+        x = unit(word) * _X[k]
+        if x < _X[k + 1]:
+            return shift + x
+
+
+@piece
+def in_layer(word):
+    """Layer and number that 64 random bits stand for, and whether it is surely below the curve."""
+    k = word & _LAYER
+    x = unit(word) * _X[k]
+    return np.int64(k), x, x < _X[k + _ONE]
+
+
+@piece
+def exponential(s):
+    """Exponential number of mean 1."""
+    k, x, sure = in_layer(bits(s))
+    return x if sure else outside(s, k, x)

@@ -17,7 +17,7 @@ import numpy as np
 
 from . import rng
 from .compile import cold_piece, piece, user_piece
-from .loop import find_bin
+from .record import find_bin
 
 #: sums closer to a whole number than this are that number
 _WHOLE = 1e-9
@@ -156,7 +156,7 @@ def make_replacement(weight: Callable[..., Any] | None) -> Callable[..., Any]:
 
 
 def make_tally(weight: Callable[..., Any]) -> Callable[..., Any]:
-    """Bind the counting of particles that stand for ``1 / w``; see `smolux.core.loop.tally_one`."""
+    """Bind the counting of particles that stand for ``1 / w``; see `tally_one` of the record."""
 
     @cold_piece
     def tally(t, grid, size, count, p):

@@ -79,7 +79,7 @@ class Method:
     def bind(rate: Any, tally: Any) -> Pieces:
         """Return the compiled pieces for a rate, the compiled ``rate(i, j, *p)``.
 
-        `tally` is what counts particles, see `smolux.core.loop.tally_one`.
+        `tally` is what counts particles, see `smolux.core.record.tally_one`.
         """
         raise NotImplementedError
 

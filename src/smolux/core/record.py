@@ -1,0 +1,52 @@
+"""What an output time records of one replica."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from .compile import cold_piece, piece
+from .state import EVENTS, MASS_IN, MASS_OUT, PARTICLES, VOLUME
+
+
+@piece
+def find_bin(grid, size):
+    """Bin of a size: the last edge at or below it."""
+    low, high = 0, grid.edges.shape[0]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if grid.edges[middle] <= size:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@cold_piece
+def tally_one(t, grid, size, count, p):
+    """Add `count` particles of one size to an observation."""
+    if size < t.counts.shape[0]:
+        t.counts[size] += count
+        return
+    t.bins[find_bin(grid, size)] += count
+    x = float(size)
+    for o in range(grid.orders.shape[0]):
+        t.sums[o] += count * x ** grid.orders[o]
+
+
+def make_record(visit: Callable[..., Any]) -> Callable[..., Any]:
+    """Bind the recording of an observation."""
+
+    @cold_piece
+    def record(s, w, t, grid, time, p):
+        t.scalars[0] = time
+        t.scalars[1] = s.count[PARTICLES]
+        t.scalars[2] = s.count[EVENTS]
+        t.scalars[3] = s.clock[VOLUME]
+        t.scalars[4] = visit(s, w, t, grid, p)
+        t.scalars[5] = s.clock[MASS_IN]
+        t.scalars[6] = s.clock[MASS_OUT]
+        for r in range(s.events.shape[0]):
+            t.events[r] = s.events[r]
+
+    return record

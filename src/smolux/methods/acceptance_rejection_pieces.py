@@ -1,0 +1,361 @@
+"""How acceptance-rejection stores particles and draws pairs, compiled."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core import rng
+from ..core.burst import Burst
+from ..core.compile import cold_piece, piece
+from ..core.levels import renew_majorant
+from ..core.loop import Pieces, note_bad, note_largest, repair
+from ..core.prefetch import prefetch
+from ..core.state import (
+    FIRST,
+    FLOOR,
+    LARGEST,
+    MAJORANT,
+    MONOMERS,
+    PARTICLES,
+    SECOND,
+    SINCE,
+    SMALLEST,
+    STORED,
+    TRIALS,
+    VALUE,
+    VOLUME,
+)
+
+#: candidates looked at before the loop may return without an event
+_PATIENCE = 4096
+#: candidates whose pairs are drawn ahead, so that their memory is there when it is needed
+AHEAD = 8
+_ONE = np.uint64(1)
+#: entries past the particles that may be written to
+SLACK = 2
+
+
+class Work(NamedTuple):
+    """Monomers are only counted (``count[MONOMERS]``); all other particles lie in one array.
+
+    Attributes
+    ----------
+    sizes : int64 array of shape (R, capacity)
+        The first ``count[STORED]`` entries are the particles of sizes above 1.
+    ahead : float64 array of shape (R, 16)
+        Uniform numbers that choose the pairs of the next candidates; -1 before the first.
+    level : int64 array of shape (R, 2)
+        Levels that the bound in force covers.
+    edges, majorant, table : arrays
+        Edges of levels; bound for each pair of levels, NaN until asked for; rates of small sizes.
+    """
+
+    sizes: np.ndarray
+    ahead: np.ndarray
+    level: np.ndarray
+    edges: np.ndarray
+    majorant: np.ndarray
+    table: np.ndarray
+
+
+class Held(NamedTuple):
+    """What changes within a burst, and the bounds in force: sizes from `bottom` to below `top`."""
+
+    monomers: Any
+    stored: Any
+    smallest: Any
+    largest: Any
+    bottom: Any
+    top: Any
+
+
+@piece
+def _view(w, r):
+    return Work(w.sizes[r], w.ahead[r], w.level[r], w.edges, w.majorant, w.table)
+
+
+@piece
+def _size(w, monomers, slot):
+    # read first, choose then: which kind comes is a coin toss that no branch predictor wins
+    place = slot - monomers
+    size = w.sizes[np.uint64(max(place, 0))]
+    return size if place >= 0 else np.int64(1)
+
+
+@piece
+def _pair(s, w):
+    monomers = s.count[MONOMERS]
+    return _size(w, monomers, s.count[FIRST]), _size(w, monomers, s.count[SECOND])
+
+
+@piece
+def _lone(s, w, k):
+    return k, _size(w, s.count[MONOMERS], k)
+
+
+@piece
+def _seize(s, w, place):
+    s.count[FIRST] = place
+
+
+@piece
+def _ask(w, monomers, slot):
+    """Ask for the memory of a later candidate.
+
+    The number of particles will have changed by a few when its turn comes, which leaves the place
+    within the same stretch of memory.
+    """
+    prefetch(w.sizes, max(slot - monomers, 0))
+
+
+def _make_find(rate: Any) -> Any:
+    @piece
+    def value_of(w, i, j, p):
+        n = w.table.shape[0]
+        if i <= n and j <= n:
+            return w.table[i - 1, j - 1]
+        return rate(float(i), float(j), *p)
+
+    @piece
+    def find(s, w, p, factor, held, n, trials, c0, c1, c2, c3):
+        """See `smolux.core.burst.Burst`; NaN for a rate that is none, which has been noted."""
+        majorant, monomers = s.clock[MAJORANT], held.monomers
+        unit = 2.0 * s.clock[VOLUME] / (float(n) * float(n - 1) * majorant * factor)
+        waited, last = 0.0, trials + _PATIENCE
+        while trials < last:
+            k = np.uint64(2 * (trials & (AHEAD - 1)))
+            trials += 1
+            word, c0, c1, c2, c3 = rng.step(c0, c1, c2, c3)
+            layer, x, sure = rng.in_layer(word)
+            if not sure:
+                s.rng[0], s.rng[1], s.rng[2], s.rng[3] = c0, c1, c2, c3
+                x = rng.outside(s.rng, layer, x)
+                c0, c1, c2, c3 = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
+            waited += x
+            a, b = np.int64(w.ahead[k] * n), np.int64(w.ahead[k + _ONE] * (n - 1))
+            b += b >= a
+            word, c0, c1, c2, c3 = rng.step(c0, c1, c2, c3)
+            u = rng.unit(word)
+            word, c0, c1, c2, c3 = rng.step(c0, c1, c2, c3)
+            v = rng.unit(word)
+            w.ahead[k], w.ahead[k + _ONE] = u, v
+            _ask(w, monomers, np.int64(u * n))
+            _ask(w, monomers, np.int64(v * n))
+            i, j = _size(w, monomers, a), _size(w, monomers, b)
+            value = value_of(w, i, j, p)
+            if not 0.0 <= value <= majorant:
+                if not 0.0 <= value < math.inf:
+                    note_bad(s, i, j, value)
+                    return math.nan, a, b, i, j, trials, c0, c1, c2, c3
+                repair(s, i, j, value)
+            if value >= majorant:
+                return waited * unit, a, b, i, j, trials, c0, c1, c2, c3
+            word, c0, c1, c2, c3 = rng.step(c0, c1, c2, c3)
+            if rng.unit(word) * majorant < value:
+                return waited * unit, a, b, i, j, trials, c0, c1, c2, c3
+        return waited * unit, -1, -1, 0, 0, trials, c0, c1, c2, c3
+
+    return find
+
+
+def _make_draw(find: Any) -> Any:
+    @piece
+    def draw(s, w, p, factor):
+        n = s.count[PARTICLES]
+        s.count[FIRST] = -1
+        if n < 2:
+            return math.inf
+        if s.clock[MAJORANT] <= 0.0:
+            return math.inf if s.clock[VALUE] == 0.0 else math.nan
+        if w.ahead[0] < 0.0:
+            for k in range(2 * AHEAD):
+                w.ahead[k] = rng.uniform(s.rng)
+        a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
+        wait, first, second, _, _, s.count[TRIALS], a, b, c, d = find(
+            s, w, p, factor, _hold(s, w), n, s.count[TRIALS], a, b, c, d
+        )
+        s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
+        s.count[FIRST], s.count[SECOND] = first, second
+        return wait
+
+    return draw
+
+
+@piece
+def _exchange(w, monomers, stored, a, b, size, count):
+    """Take the particles of two slots out and put others in: one, or any number of monomers."""
+    x, y = a - monomers, b - monomers
+    first, second = np.int64(x >= 0), np.int64(y >= 0)
+    monomers -= 2 - first - second
+    if size > 1:
+        w.sizes[np.uint64(x if x >= 0 else y if y >= 0 else stored)] = size
+        stored += 1 - first - second
+        # unless both were stored, the entry past the end is written over itself
+        gap = y if x >= 0 and y >= 0 else stored
+        w.sizes[np.uint64(gap)] = w.sizes[np.uint64(stored)]
+        return monomers, stored
+    high, low = max(x, y), min(x, y)
+    if high >= 0:
+        stored -= 1
+        w.sizes[high] = w.sizes[stored]
+    if low >= 0:
+        stored -= 1
+        w.sizes[low] = w.sizes[stored]
+    return monomers + count, stored
+
+
+@piece
+def _row(s, w):
+    if w.ahead[0] < 0.0 or s.clock[MAJORANT] <= 0.0:
+        return 0
+    # each event brings the next look at all sizes nearer by two at most, see `_prepare`
+    return (s.count[PARTICLES] + 64 - s.count[SINCE]) // 2
+
+
+@piece
+def _hold(s, w):
+    return Held(
+        s.count[MONOMERS],
+        s.count[STORED],
+        s.count[SMALLEST],
+        s.count[LARGEST],
+        w.edges[w.level[0]],
+        w.edges[w.level[1] + 1],
+    )
+
+
+@piece
+def _replace(w, held, a, b, size, count):
+    room = held.stored + SLACK <= w.sizes.shape[0]
+    if size < held.bottom or size >= held.top or not room or (size > 1 and count > 1):
+        return False, held
+    monomers, stored = _exchange(w, held.monomers, held.stored, a, b, size, count)
+    smallest, largest = min(held.smallest, size), max(held.largest, size)
+    return True, Held(monomers, stored, smallest, largest, held.bottom, held.top)
+
+
+@piece
+def _release(s, held):
+    s.count[MONOMERS], s.count[STORED] = held.monomers, held.stored
+    s.count[SMALLEST], s.count[LARGEST] = held.smallest, held.largest
+
+
+@piece
+def _remove(s, w, slot):
+    """Take a particle out: the last of its kind moves into the gap."""
+    place = slot - s.count[MONOMERS]
+    if place < 0:
+        s.count[MONOMERS] -= 1
+        return
+    s.count[STORED] -= 1
+    w.sizes[place] = w.sizes[s.count[STORED]]
+
+
+@piece
+def _insert(s, w, size, count):
+    if size == 1:
+        s.count[MONOMERS] += count
+        return
+    stored = s.count[STORED]
+    for k in range(count):
+        w.sizes[stored + k] = size
+    s.count[STORED] = stored + count
+
+
+@piece
+def _update(s, w, gone, entries, p):
+    needed = np.int64(SLACK)
+    for e in range(entries):
+        needed += s.counts[e] if s.sizes[e] > 1 else 0
+    if s.count[STORED] + needed > w.sizes.shape[0]:
+        return False
+    for e in range(entries):
+        s.count[PARTICLES] += s.counts[e]
+        s.count[SMALLEST] = min(s.count[SMALLEST], s.sizes[e])
+        note_largest(s, s.sizes[e])
+    a, b = s.count[FIRST], s.count[SECOND]
+    if gone == 3:
+        s.count[PARTICLES] -= 2
+        if entries == 1 and (s.sizes[0] == 1 or s.counts[0] == 1):
+            s.count[MONOMERS], s.count[STORED] = _exchange(
+                w, s.count[MONOMERS], s.count[STORED], a, b, s.sizes[0], s.counts[0]
+            )
+            return True
+        # monomers are numbered first: taking the later slot first keeps the number of the other
+        _remove(s, w, max(a, b))
+        _remove(s, w, min(a, b))
+    elif gone > 0:
+        _remove(s, w, a if gone == 1 else b)
+        s.count[PARTICLES] -= 1
+    for e in range(entries):
+        _insert(s, w, s.sizes[e], s.counts[e])
+    return True
+
+
+@cold_piece
+def _rescan(s, w):
+    """Take the smallest and largest size afresh; the bound in force is then renewed."""
+    s.count[SINCE] = 0
+    low = np.int64(1) if s.count[MONOMERS] > 0 else max(w.sizes[0], np.int64(1))
+    high = low
+    for k in range(s.count[STORED]):
+        low = min(low, w.sizes[k])
+        high = max(high, w.sizes[k])
+    s.count[SMALLEST], s.count[LARGEST] = low, high
+    w.level[0], w.level[1] = w.edges.shape[0] - 2, 0
+
+
+@piece
+def _prepare(s, w, p):
+    if s.count[SINCE] > s.count[PARTICLES] + 64:
+        _rescan(s, w)
+    s.clock[MAJORANT] = max(s.clock[MAJORANT], s.clock[FLOOR])
+    return renew_majorant(s, w.edges, w.majorant, w.level)
+
+
+@cold_piece
+def _double(s, w):
+    stored = s.count[STORED]
+    if 2 * stored + SLACK > w.sizes.shape[0]:
+        return False
+    for k in range(stored):
+        w.sizes[stored + k] = w.sizes[k]
+    s.count[STORED] *= 2
+    s.count[MONOMERS] *= 2
+    s.count[PARTICLES] *= 2
+    return True
+
+
+def _make_visit(tally: Any) -> Any:
+    @cold_piece
+    def visit(s, w, t, grid, p):
+        largest = np.int64(0)
+        if s.count[MONOMERS] > 0:
+            tally(t, grid, np.int64(1), s.count[MONOMERS], p)
+            largest = np.int64(1)
+        for k in range(s.count[STORED]):
+            tally(t, grid, w.sizes[k], 1, p)
+            largest = max(largest, w.sizes[k])
+        return largest
+
+    return visit
+
+
+def bind(rate: Any, tally: Any) -> Pieces:
+    """Bind the pieces to a rate and a way to count."""
+    find = _make_find(rate)
+    return Pieces(
+        _view,
+        _make_draw(find),
+        _pair,
+        _update,
+        _prepare,
+        _double,
+        _lone,
+        _seize,
+        _make_visit(tally),
+        Burst(_row, _hold, find, _replace, _release),
+    )
