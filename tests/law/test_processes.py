@@ -1,12 +1,14 @@
 """Processes beside encounters: against exact solutions, reference values and each other.
 
-Evaporation with every weighting and method is in `test_weightings`. Here one compiled loop holds
-all the others; what is not wanted has a rate of next to nothing.
+One model holds all processes, so that each method has one compiled loop for all powers of the size
+as weight; what is not wanted has a rate of next to nothing. Small systems with evaporation are in
+`test_weightings`.
 """
 
 from __future__ import annotations
 
 import csv
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +31,7 @@ FREE_MOLECULAR = sx.kernels.Ballistic(scale=1 / (4 * np.sqrt(2)))
 
 def everything(
     evaporation: float = 0.0, fragmentation: float = 1e-300, removal: float = 0.0,
-    above: int = 10**9, source: float = 1e-300, initial: Any = None,
+    above: int = 10**9, source: float = 1e-300, disruption: float = 0.0, initial: Any = None,
 ) -> sx.Model:  # fmt: skip
     """Make a model of all processes but shattering, those of which the rate varies among them."""
     processes = [
@@ -38,6 +40,7 @@ def everything(
         P.Fragmentation(fragmentation),
         P.Evaporation(evaporation, varying="1 + sin(5 * t)"),
         P.Aggregation(),
+        P.CollisionalFragmentation(disruption, 2.5, largest=12),
     ]
     return sx.Model(laws.kernel("constant"), processes, initial or sx.initial.monodisperse())
 
@@ -53,23 +56,28 @@ def observed(ds: Any, t: float, sizes: slice) -> float:
 
 # --- simulation against the solver, and the balance of mass ---------------------------------------
 
+TIMES = (0.7, 3.0)
 CASES = {
     "evaporation": {"evaporation": 0.5},
     "fragmentation": {"fragmentation": 0.2},
     "removal": {"removal": 0.3},
     "source": {"source": 1.0, "initial": sx.initial.empty()},
     "source and sink": {"source": 1.0, "above": 20, "initial": sx.initial.empty()},
-    "all": {"evaporation": 0.5, "fragmentation": 0.2, "removal": 0.1, "above": 50, "source": 1.0},
-}
+    "collisional fragmentation": {"disruption": 0.8},
+    "all": {
+        "evaporation": 0.5, "fragmentation": 0.2, "removal": 0.1, "above": 50, "source": 1.0,
+        "disruption": 0.1,
+    },
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_simulation_and_solver(case: str) -> None:
-    model, times = everything(**CASES[case]), [0.7, 3.0]
-    assert [p.name for p in model.processes] == [
-        "aggregation", "removal", "fragmentation", "evaporation", "source"
-    ]  # fmt: skip
-    ds, truth = simulated(model, times, 41), sx.solve(model, times)
+@lru_cache
+def solved(case: str) -> Any:
+    return sx.solve(everything(**CASES[case]), TIMES)
+
+
+def agree(ds: Any, truth: Any, case: str) -> None:
+    """Moments, densities of some sizes, and the mass that comes and goes."""
     for order in (0, 1, 2):
         values, expected = (x["moment"].sel(order=order).values for x in (ds, truth))
         if order == 1 and values.std() < 1e-12:
@@ -77,25 +85,70 @@ def test_simulation_and_solver(case: str) -> None:
             continue
         laws.agree(values, expected[0], (case, order))
     for size in (1, 2, 5):
-        laws.agree(ds["n"].sel(size=size).values, truth["n"].sel(size=size).values[0], size)
+        laws.agree(ds["n"].sel(size=size).values, truth["n"].sel(size=size).values[0], (case, size))
+    if float(ds["volume"].max()) == float(ds["volume"].min()):
+        for name in ("mass_in", "mass_out"):
+            moved = (ds[name] / ds["volume"]).values[:, 1]
+            if moved.std() > 0:
+                laws.agree(moved, truth[name].values[0, 1], (case, name))
+    assert ds.attrs["warnings"] == "[]"
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_simulation_and_solver(case: str) -> None:
+    model, truth = everything(**CASES[case]), solved(case)
+    assert [p.name for p in model.processes] == [
+        "aggregation", "collisional-fragmentation", "removal", "fragmentation", "evaporation",
+        "source",
+    ]  # fmt: skip
+    ds = simulated(model, TIMES, 41)
+    agree(ds, truth, case)
     # events of each process, where the volume stays the same
     if float(ds["volume"].max()) == float(ds["volume"].min()):
         found = ds["events"].values / ds["volume"].values[..., None]
         seen = found.std(axis=0).min(axis=0) > 0
-        seen[1] &= "above" not in CASES[case]  # the solver does not count what passes the limit
+        seen[2] &= "above" not in CASES[case]  # the solver does not count what passes the limit
         laws.agree(found[..., seen], truth["events"].values[0][:, seen], "events")
-        for name in ("mass_in", "mass_out"):
-            gone = (ds[name] / ds["volume"]).values[:, 1]
-            if gone.std() > 0:
-                laws.agree(gone, truth[name].values[0, 1], name)
     total = ds["mass"] - ds["mass_in"] + ds["mass_out"]
     start = 0 if "initial" in CASES[case] else 1000
     np.testing.assert_array_equal(total, start * ds["volume"] / ds["volume"][0, 0].item())
     np.testing.assert_array_equal(ds["mass"], np.rint(ds["mass"]))
     balance = truth["mass"] - truth["mass_in"] + truth["mass_out"]
     np.testing.assert_allclose(balance, start / 1000, atol=1e-7)
-    assert ds.attrs["warnings"] == "[]"
     assert np.isnan(ds["extinction_time"]).all()
+
+
+#: methods and weightings that are compiled and run always; the power one is mass flow
+QUICK = {
+    ("acceptance-rejection", "0.5"),
+    ("acceptance-rejection", "1"),
+    ("acceptance-rejection", "-0.3"),
+}
+
+
+def every_pair() -> list[Any]:
+    """All methods with all weightings but the one of `test_simulation_and_solver`."""
+    pairs = [(m.name, w) for m in sx.methods.METHODS for w in ("0.5", "1", "-0.3", "number",
+                                                               "mass-flow")]  # fmt: skip
+    return [
+        pytest.param(*pair, marks=() if pair in QUICK else pytest.mark.slow)
+        for pair in pairs
+        if pair != ("acceptance-rejection", "number")
+    ]
+
+
+@pytest.mark.parametrize(("method", "weighting"), every_pair())
+def test_every_method_and_weighting(method: str, weighting: str) -> None:
+    """Each process alone and all together, against the solver."""
+    named = weighting in ("number", "mass-flow")
+    what: Any = weighting if named else sx.weighting.WeightFunction(float(weighting))
+    for k, case in enumerate(CASES):
+        ds = simulated(everything(**CASES[case]), TIMES, 60 + k, method=method, weighting=what)
+        agree(ds, solved(case), case)
+        if weighting in ("number", "1", "mass-flow"):  # mass is exact, with others on average
+            total = (ds["mass"] - ds["mass_in"] + ds["mass_out"]) / ds["volume"]
+            start = 0.0 if "initial" in CASES[case] else 1.0
+            np.testing.assert_allclose(total, start, atol=1e-9)
 
 
 def test_trajectories_do_not_depend_on_the_output_times() -> None:
@@ -118,27 +171,14 @@ def test_nothing_is_left() -> None:
     laws.agree(ds["mass"].values[:, 0], 50 * np.exp(-1.0))
 
 
-def test_collisional_fragmentation() -> None:
-    """Debris of a power law, by mass flow; of monomers alone it is shattering."""
+def test_debris_of_monomers_is_shattering() -> None:
     kernel, times = laws.kernel("constant"), [1.0, 6.0]
-    model, monomers, shattering = (
+    monomers, shattering = (
         sx.Model(kernel, [P.Aggregation(), process])
-        for process in (
-            P.CollisionalFragmentation(0.2, 2.5, largest=12),
-            P.CollisionalFragmentation(0.2, [1.0]),
-            P.Shattering(0.2),
-        )
+        for process in (P.CollisionalFragmentation(0.2, [1.0]), P.Shattering(0.2))
     )
     one, other = (sx.solve(m, times)["moment"].values for m in (monomers, shattering))
     np.testing.assert_allclose(one, other, rtol=1e-9)
-    truth = sx.solve(model, times)
-    ds = simulated(model, times, 44, weighting="mass-flow")
-    for order in (0, 2):
-        expected = truth["moment"].sel(order=order).values[0]
-        laws.agree(ds["moment"].sel(order=order).values, expected, order)
-    for size in (1, 2, 5):
-        laws.agree(ds["n"].sel(size=size).values, truth["n"].sel(size=size).values[0], size)
-    np.testing.assert_allclose(ds["moment"].sel(order=1), 1.0, rtol=1e-12)
 
 
 def test_fragments() -> None:
