@@ -36,6 +36,8 @@ from .state import (
 
 #: a shorter row is not worth its beginning
 _LEAST = 8
+# What `Burst.replace` says of an event.
+NOT_PLAIN, PLAIN, LAST = 0, 1, 2
 
 
 class Burst(NamedTuple):
@@ -51,8 +53,9 @@ class Burst(NamedTuple):
         As `Pieces.draw`: the waiting time, the slots of the pair (-1: nothing happens then) and
         its sizes, the candidates looked at so far and the four words of the random generator.
     replace : ``replace(w, held, first, second, size, count)``
-        Take the pair out and put `count` particles of a size in: whether that is within the room
-        and the bounds in force, and what is held then. If not, nothing has changed.
+        Take the pair out and put `count` particles of a size in: `PLAIN`, or `LAST` if
+        `Pieces.prepare` has to look at what that made; `NOT_PLAIN`, with nothing changed, if it is
+        not within the room or the bounds in force. And what is held then.
     release : ``release(s, held)``
         Write what is held to the state.
     """
@@ -108,19 +111,19 @@ def make_burst(brought: Burst, outcome: Callable[..., Any], pairs: int) -> Calla
             if math.isnan(wait):
                 reason = BAD_RATE
                 break
-            pending, r, done = time + wait, -1, False
+            pending, r, done = time + wait, -1, NOT_PLAIN
             if first >= 0 and pending <= until:
                 r = 0
                 if pairs > 1:
-                    word, a, b, c, d = rng.step(a, b, c, d)
-                    r = choose(windows, window, rng.unit(word) * factor)
+                    u, a, b, c, d = rng.uniform_of(a, b, c, d)
+                    r = choose(windows, window, u * factor)
                     first = first if r >= 0 else -1
             if r >= 0:
                 entries, gone = outcome(r, i, j, s, p, q)
                 size, count = s.sizes[0], s.counts[0]
                 if entries == 1 and gone == 3 and size < LIMIT and s.count[REPAIRS] == repairs:
                     done, held = replace(w, held, first, second, size, count)
-            if not done:
+            if done == NOT_PLAIN:
                 s.count[FIRST], s.count[SECOND], s.count[PROCESS] = first, second, r
                 s.clock[PENDING] = pending
                 s.count[PHASE] = FIRE
@@ -129,6 +132,8 @@ def make_burst(brought: Burst, outcome: Callable[..., Any], pairs: int) -> Calla
             events += 1
             s.events[r] += 1
             time = pending
+            if done == LAST:
+                break
         s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
         s.count[SINCE] += events - s.count[EVENTS]
         s.count[PARTICLES], s.count[EVENTS], s.count[TRIALS] = n, events, trials

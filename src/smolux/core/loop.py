@@ -170,9 +170,10 @@ def make_next_event(
 
         @piece
         def next_event_after_burst(s, w, windows, p, q, until, stop):
+            before = s.count[EVENTS]
             reason = burst(s, w, windows, p, q, until, stop)
-            if reason != 0 or s.count[PHASE] == FIRE:
-                return reason
+            if reason != 0 or s.count[PHASE] == FIRE or s.count[EVENTS] > before:
+                return reason  # without a pending event, to be prepared for the next
             return draw_next(s, w, windows, p, q, until, stop)
 
         return next_event_after_burst

@@ -65,6 +65,13 @@ def unit(word):
 
 
 @piece
+def uniform_of(s0, s1, s2, s3):
+    """As `uniform`, for words that the caller holds; and the words after it."""
+    word, s0, s1, s2, s3 = step(s0, s1, s2, s3)
+    return unit(word), s0, s1, s2, s3
+
+
+@piece
 def uniform(s):
     """Uniform number in [0, 1), a multiple of 2**-53."""
     return unit(bits(s))
@@ -92,7 +99,7 @@ _EDGE = float(_X[1])
 
 
 @cold_piece
-def outside(s, k, x):
+def _outside(s, k, x):
     """Exponential number of mean 1, given that `x` in layer `k` is not surely below the curve."""
     shift = 0.0
     while True:
@@ -108,15 +115,20 @@ def outside(s, k, x):
 
 
 @piece
-def in_layer(word):
-    """Layer and number that 64 random bits stand for, and whether it is surely below the curve."""
+def exponential_of(s, s0, s1, s2, s3):
+    """As `exponential`, for a state of which the caller holds the words; and the words after it."""
+    word, s0, s1, s2, s3 = step(s0, s1, s2, s3)
     k = word & _LAYER
     x = unit(word) * _X[k]
-    return np.int64(k), x, x < _X[k + _ONE]
+    if x >= _X[k + _ONE]:
+        s[0], s[1], s[2], s[3] = s0, s1, s2, s3
+        x = _outside(s, np.int64(k), x)
+        s0, s1, s2, s3 = s[0], s[1], s[2], s[3]
+    return x, s0, s1, s2, s3
 
 
 @piece
 def exponential(s):
     """Exponential number of mean 1."""
-    k, x, sure = in_layer(bits(s))
-    return x if sure else outside(s, k, x)
+    x, s[0], s[1], s[2], s[3] = exponential_of(s, s[0], s[1], s[2], s[3])
+    return x

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core import rng
-from ..core.burst import Burst
+from ..core.burst import NOT_PLAIN, PLAIN, Burst
 from ..core.compile import cold_piece, piece
 from ..core.levels import renew_majorant
 from ..core.loop import Pieces, note_bad, note_largest, repair
@@ -128,19 +128,12 @@ def _make_find(rate: Any) -> Any:
         while trials < last:
             k = np.uint64(2 * (trials & (AHEAD - 1)))
             trials += 1
-            word, c0, c1, c2, c3 = rng.step(c0, c1, c2, c3)
-            layer, x, sure = rng.in_layer(word)
-            if not sure:
-                s.rng[0], s.rng[1], s.rng[2], s.rng[3] = c0, c1, c2, c3
-                x = rng.outside(s.rng, layer, x)
-                c0, c1, c2, c3 = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
+            x, c0, c1, c2, c3 = rng.exponential_of(s.rng, c0, c1, c2, c3)
             waited += x
             a, b = np.int64(w.ahead[k] * n), np.int64(w.ahead[k + _ONE] * (n - 1))
             b += b >= a
-            word, c0, c1, c2, c3 = rng.step(c0, c1, c2, c3)
-            u = rng.unit(word)
-            word, c0, c1, c2, c3 = rng.step(c0, c1, c2, c3)
-            v = rng.unit(word)
+            u, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)
+            v, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)
             w.ahead[k], w.ahead[k + _ONE] = u, v
             _ask(w, monomers, np.int64(u * n))
             _ask(w, monomers, np.int64(v * n))
@@ -153,8 +146,8 @@ def _make_find(rate: Any) -> Any:
                 repair(s, i, j, value)
             if value >= majorant:
                 return waited * unit, a, b, i, j, trials, c0, c1, c2, c3
-            word, c0, c1, c2, c3 = rng.step(c0, c1, c2, c3)
-            if rng.unit(word) * majorant < value:
+            u, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)
+            if u * majorant < value:
                 return waited * unit, a, b, i, j, trials, c0, c1, c2, c3
         return waited * unit, -1, -1, 0, 0, trials, c0, c1, c2, c3
 
@@ -231,10 +224,10 @@ def _hold(s, w):
 def _replace(w, held, a, b, size, count):
     room = held.stored + SLACK <= w.sizes.shape[0]
     if size < held.bottom or size >= held.top or not room or (size > 1 and count > 1):
-        return False, held
+        return NOT_PLAIN, held
     monomers, stored = _exchange(w, held.monomers, held.stored, a, b, size, count)
     smallest, largest = min(held.smallest, size), max(held.largest, size)
-    return True, Held(monomers, stored, smallest, largest, held.bottom, held.top)
+    return PLAIN, Held(monomers, stored, smallest, largest, held.bottom, held.top)
 
 
 @piece

@@ -9,17 +9,20 @@ import numpy as np
 
 from ..core import rng
 from ..core.alias import outcome
+from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst
 from ..core.compile import cold_piece, piece
 from ..core.loop import Pieces, note_bad, repair
 from ..core.prefetch import prefetch
-from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, TRIALS, VOLUME
+from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, TRIALS, VOLUME
 from .size_class_store import (
     AHEAD,
+    BLOCK,
+    FREE,
     NEXT,
     PAIRS,
     STALE,
+    chunks_for,
     double,
-    fits,
     insert,
     make_visit,
     place,
@@ -59,14 +62,14 @@ def _seize(s, w, place):
     s.count[FIRST] = place
 
 
-@piece
-def _draw_ahead(s, w):
+@cold_piece
+def _draw_ahead(w, words):
     """Draw candidates: they depend on the table alone, not on the events in between."""
     pairs = w.meta[PAIRS]
     for k in range(AHEAD):
-        classes = w.classes[outcome(w.share, w.alias, pairs, rng.uniform(s.rng))]
+        classes = w.classes[outcome(w.share, w.alias, pairs, rng.uniform(words))]
         g, h = np.int64(classes >> 16), np.int64(classes & 0xFFFF)
-        a, b = rng.below(s.rng, w.room[g]), rng.below(s.rng, w.room[h])
+        a, b = rng.below(words, w.room[g]), rng.below(words, w.room[h])
         w.one[k], w.two[k] = (g << _SLOT_BITS) | a, (h << _SLOT_BITS) | b
         if w.listed[g]:
             prefetch(w.pool, place(w, g, a))
@@ -75,74 +78,143 @@ def _draw_ahead(s, w):
     w.meta[NEXT] = 0
 
 
-def _make_draw(rate: Any) -> Any:
+@cold_piece
+def _raise_bound(s, w, g, h, i, j, value):
+    """Take in a rate above its bound."""
+    repair(s, i, j, value)
+    w.high[g, h] = w.high[h, g] = 1.1 * value
+    w.low[g, h] = w.low[h, g] = 0.0
+    w.meta[STALE] = 1
+
+
+def _make_find(rate: Any) -> Any:
     @piece
-    def accepts(s, w, g, h, a, b, p):
+    def accepts(s, w, g, h, i, j, u, p):
         """Whether the rate accepts a candidate: 1 or 0; -1 if there is no rate."""
-        u = rng.uniform(s.rng)
         if u < w.low[g, h]:
             return 1
-        i, j = size_at(w, g, a), size_at(w, h, b)
         value = rate(float(i), float(j), *p)
         if not 0.0 <= value <= w.high[g, h]:
             if not 0.0 <= value < math.inf:
                 note_bad(s, i, j, value)
                 return -1
-            repair(s, i, j, value)
-            w.high[g, h] = w.high[h, g] = 1.1 * value
-            w.low[g, h] = w.low[h, g] = 0.0
-            w.meta[STALE] = 1
+            _raise_bound(s, w, g, h, i, j, value)
             return 1
         return 1 if u * w.high[g, h] < value else 0
 
     @piece
-    def draw(s, w, p, factor):
-        s.count[FIRST] = -1
-        if s.count[PARTICLES] < 2 or s.clock[MAJORANT] <= 0.0:
-            return math.inf
-        wait = 0.0
-        for _ in range(_PATIENCE):
+    def find(s, w, p, factor, held, n, trials, c0, c1, c2, c3):
+        """See `smolux.core.burst.Burst`; NaN for a rate that is none, which has been noted."""
+        unit = s.clock[VOLUME] / (s.clock[MAJORANT] * factor)
+        waited, last = 0.0, trials + _PATIENCE
+        while trials < last:
             if w.meta[NEXT] == AHEAD:
-                _draw_ahead(s, w)
+                s.rng[0], s.rng[1], s.rng[2], s.rng[3] = c0, c1, c2, c3
+                _draw_ahead(w, s.rng)
+                c0, c1, c2, c3 = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
             k = w.meta[NEXT]
             w.meta[NEXT] = k + 1
-            s.count[TRIALS] += 1
-            wait += rng.exponential(s.rng)
+            trials += 1
+            x, c0, c1, c2, c3 = rng.exponential_of(s.rng, c0, c1, c2, c3)
+            waited += x
             one, two = w.one[k], w.two[k]
             g, a, h, b = one >> _SLOT_BITS, one & _SLOT, two >> _SLOT_BITS, two & _SLOT
             if a >= w.number[g] or b >= w.number[h] or one == two:
                 continue
-            taken = accepts(s, w, g, h, a, b, p)
+            u, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)
+            i, j = size_at(w, g, a), size_at(w, h, b)
+            taken = accepts(s, w, g, h, i, j, u, p)
             if taken < 0:
-                return math.nan
+                return math.nan, one, two, i, j, trials, c0, c1, c2, c3
             if taken == 1:
-                s.count[FIRST], s.count[SECOND] = one, two
-                break
-        return wait * s.clock[VOLUME] / (s.clock[MAJORANT] * factor)
+                return waited * unit, one, two, i, j, trials, c0, c1, c2, c3
+        return waited * unit, -1, -1, 0, 0, trials, c0, c1, c2, c3
+
+    return find
+
+
+def _make_draw(find: Any) -> Any:
+    @piece
+    def draw(s, w, p, factor):
+        n = s.count[PARTICLES]
+        s.count[FIRST] = -1
+        if n < 2 or s.clock[MAJORANT] <= 0.0:
+            return math.inf
+        a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
+        wait, first, second, _, _, s.count[TRIALS], a, b, c, d = find(
+            s, w, p, factor, (), n, s.count[TRIALS], a, b, c, d
+        )
+        s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
+        s.count[FIRST], s.count[SECOND] = first, second
+        return wait
 
     return draw
 
 
 @piece
+def _remove_both(w, a, b):
+    # the later place of a class goes first: then the other stays where it is
+    remove(w, max(a, b) >> _SLOT_BITS, max(a, b) & _SLOT)
+    remove(w, min(a, b) >> _SLOT_BITS, min(a, b) & _SLOT)
+
+
+@piece
 def _update(s, w, gone, entries, p):
-    if not fits(s, w, entries):
+    chunks = np.int64(0)
+    for e in range(entries):
+        chunks += chunks_for(w, s.sizes[e], s.counts[e])
+    if chunks > w.meta[FREE]:
         return False
     a, b = s.count[FIRST], s.count[SECOND]
     if gone == 3:
-        # the later place of a class goes first: then the other stays where it is
-        remove(s, w, max(a, b) >> _SLOT_BITS, max(a, b) & _SLOT)
-        remove(s, w, min(a, b) >> _SLOT_BITS, min(a, b) & _SLOT)
+        _remove_both(w, a, b)
         s.count[PARTICLES] -= 2
     elif gone > 0:
         one = a if gone == 1 else b
-        remove(s, w, one >> _SLOT_BITS, one & _SLOT)
+        remove(w, one >> _SLOT_BITS, one & _SLOT)
         s.count[PARTICLES] -= 1
     for e in range(entries):
-        insert(s, w, s.sizes[e], s.counts[e])
+        insert(w, s.sizes[e], s.counts[e])
+        s.count[PARTICLES] += s.counts[e]
     return True
+
+
+@piece
+def _row(s, w):
+    return w.meta[BLOCK] - s.count[SINCE] if s.clock[MAJORANT] > 0.0 else np.int64(0)
+
+
+@piece
+def _hold(s, w):
+    return ()
+
+
+@piece
+def _replace(w, held, a, b, size, count):
+    if chunks_for(w, size, count) > w.meta[FREE]:
+        return NOT_PLAIN, held
+    _remove_both(w, a, b)
+    insert(w, size, count)
+    return (PLAIN if w.meta[STALE] == 0 else LAST), held
+
+
+@piece
+def _release(s, held):
+    pass
 
 
 def bind(rate: Any, tally: Any) -> Pieces:
     """Bind the pieces to a rate and a way to count."""
-    visit = make_visit(tally)
-    return Pieces(view, _make_draw(rate), _pair, _update, prepare, double, _lone, _seize, visit)
+    find = _make_find(rate)
+    return Pieces(
+        view,
+        _make_draw(find),
+        _pair,
+        _update,
+        prepare,
+        double,
+        _lone,
+        _seize,
+        make_visit(tally),
+        Burst(_row, _hold, find, _replace, _release),
+    )

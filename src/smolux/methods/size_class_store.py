@@ -124,7 +124,7 @@ def size_at(w, g, slot):
 
 
 @piece
-def remove(s, w, g, slot):
+def remove(w, g, slot):
     """Take a particle out: the last of its class moves into the gap."""
     last = w.number[g] - 1
     w.number[g] = last
@@ -147,7 +147,7 @@ def append(w, g, size):
 
 
 @piece
-def insert(s, w, size, count):
+def insert(w, size, count):
     """Put particles of one size in; there must be free chunks."""
     g = slot_of(size, w.meta[BITS])
     if w.listed[g]:
@@ -156,24 +156,21 @@ def insert(s, w, size, count):
     else:
         w.number[g] += count
     w.flow[g] += SHARE * count
-    s.count[PARTICLES] += count
     if w.number[g] > w.room[g]:
         w.meta[STALE] = 1
 
 
 @piece
-def fits(s, w, entries):
-    """Whether what the event makes has room."""
-    chunks = np.int64(0)
-    for e in range(entries):
-        size, g = s.sizes[e], slot_of(s.sizes[e], w.meta[BITS])
-        if g >= w.number.shape[0] or size > w.meta[WIDEST]:
-            return False
-        if w.listed[g]:
-            chunks += (s.counts[e] >> w.meta[CHUNK]) + 1
-            if (w.number[g] + s.counts[e]) >> w.meta[CHUNK] >= w.where.shape[1]:
-                return False
-    return chunks <= w.meta[FREE]
+def chunks_for(w, size, count):
+    """Chunks that particles of one size may need; more than there are if they have no room."""
+    g = slot_of(size, w.meta[BITS])
+    if g >= w.number.shape[0] or size > w.meta[WIDEST]:
+        return w.meta[FREE] + 1
+    if not w.listed[g]:
+        return 0
+    if (w.number[g] + count) >> w.meta[CHUNK] >= w.where.shape[1]:
+        return w.meta[FREE] + 1
+    return (count >> w.meta[CHUNK]) + 1
 
 
 @cold_piece
