@@ -174,9 +174,11 @@ def test_nothing_moves():
 
 def test_no_replay():
     s = sp.lattice(16, 0.2, seed=2)
-    result = sp.simulate(s, "time-stepping", times=[0.0])
+    result = sp.simulate(s, "time-stepping", times=[0.0], max_events=5)
     with pytest.raises(InputError, match="does not determine"):
         sp.replay(result, 0.0)
+    with pytest.raises(InputError, match="does not determine"):
+        sp.resume(result)
 
 
 def test_mistakes_are_named():

@@ -30,6 +30,7 @@ _LAZY = {
     "pair_distribution": "correlations",
     "random": "initial",
     "replay": "result",
+    "resume": "resuming",
     "shapes": "morphology",
     "simulate": "running",
     "snapshot": "morphology",
@@ -62,6 +63,7 @@ __all__ = [
     "pair_distribution",
     "random",
     "replay",
+    "resume",
     "shapes",
     "simulate",
     "snapshot",
@@ -80,6 +82,7 @@ if TYPE_CHECKING:
     from .methods import METHODS
     from .morphology import Contacts, Snapshot, contacts, shapes, snapshot
     from .result import log_of, replay, system_of
+    from .resuming import resume
     from .running import SpatialProgress, simulate
     from .system import System
     from .time_stepping import TimeStepping

@@ -33,6 +33,11 @@ class Logger:
         self._parts: list[tuple[NDArray[Any], ...]] = []
         self.events = 0
 
+    def take(self, log: Log) -> None:
+        """Put the log of an earlier run before all others."""
+        self._parts.append((log.time, log.first, log.second))
+        self.events += len(log.time)
+
     def keep(self, count: int) -> None:
         """Take the first events out of the room."""
         if count:

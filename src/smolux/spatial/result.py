@@ -251,6 +251,26 @@ def log_of(result: xr.DataTree) -> Log:
     )
 
 
+def trace_of(result: xr.DataTree) -> Trace:
+    """Return what a run by an exact method left behind, to go on from.
+
+    Raises
+    ------
+    InputError
+        If its log does not determine the motion.
+    """
+    log = log_of(result)
+    _check_exact(result)
+    ds = result.to_dataset()
+    return Trace(
+        float(result.attrs["time_reached"]),
+        ds["position"].values,
+        ds["velocity"].values,
+        ds["cluster"].values.astype(np.int32),
+        log,
+    )
+
+
 def replay(result: xr.DataTree, time: float) -> xr.Dataset:
     """Return the discs at an instant, from the log of a run; exact to rounding.
 
@@ -275,11 +295,7 @@ def replay(result: xr.DataTree, time: float) -> xr.Dataset:
     reached = float(result.attrs["time_reached"])
     if not 0 <= time <= reached:
         raise InputError(f"time = {time!r}: must lie between 0 and {reached:g}, which was reached")
-    if "point" not in result["events"]:
-        raise InputError(
-            f"result: was made by the method {result.attrs.get('method')!r}, whose log does not "
-            "determine the motion; use an event-driven method"
-        )
+    _check_exact(result)
     values = replayed(system_of(result), log_of(result), float(time))
     root = result.to_dataset()
     values |= {"radius": root["radius"].values, "mass": root["mass"].values}
@@ -287,6 +303,14 @@ def replay(result: xr.DataTree, time: float) -> xr.Dataset:
     for name in ("position", "velocity", "cluster"):
         ds[name].attrs["long_name"] = name
     return ds.assign_attrs(time=float(time), model=result.attrs["model"])
+
+
+def _check_exact(result: xr.DataTree) -> None:
+    if "point" not in result["events"]:
+        raise InputError(
+            f"result: was made by the method {result.attrs.get('method')!r}, whose log does not "
+            "determine the motion; use an event-driven method"
+        )
 
 
 def _check(result: Any) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import is_number
 from ..errors import InputError, Interrupted, did_you_mean
+from .ctrlc import CtrlC
 from .method import Run, SpatialMethod
 from .methods import METHODS
 from .playing import narrate
@@ -108,7 +110,7 @@ def simulate(
     InputError
         With every mistake in the arguments.
     Interrupted
-        On Ctrl-C; holds the result of what was reached.
+        On Ctrl-C; holds the result of what was reached, from which `resume` goes on.
 
     Notes
     -----
@@ -126,23 +128,50 @@ def simulate(
     >>> result["events"].sizes["event"]
     99
     """
-    chosen, output = _checked(
+    chosen, output = checked(
         system, method, until, clusters, times, max_events, time_limit, progress
     )
+    begun = partial(chosen.start, system, np.empty(0) if output is None else output)
+    limits = Limits(until, clusters, max_events, time_limit)
+    return driven(system, chosen, begun, output, limits, progress)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When to stop."""
+
+    until: float | None
+    clusters: int
+    max_events: int | None
+    time_limit: float | None
+
+    def numbers(self) -> tuple[float, float, float]:
+        """Return the last time, the number of events and the seconds; infinite if left out."""
+        given = (self.until, self.max_events, self.time_limit)
+        until, events, seconds = (np.inf if x is None else float(x) for x in given)
+        return until, events, seconds
+
+
+def driven(
+    system: System, method: SpatialMethod, begun: Callable[[], Run], output: Float | None,
+    limits: Limits, progress: Any,
+) -> xr.DataTree:  # fmt: skip
+    """Drive a run to its end and make the result of it."""
     started = clock.perf_counter()
-    run = chosen.start(system, np.empty(0) if output is None else output)
-    driver = _Driver(run, len(system), clusters, started, progress)
-    limit = np.inf if time_limit is None else time_limit
-    most = np.inf if max_events is None else max_events
-    try:
-        stopped = driver.drive(np.inf if until is None else float(until), most, limit)
-    except KeyboardInterrupt:
-        driver.interrupted = True
-        stopped = "interrupted"
+    run = begun()
+    with CtrlC() as keys:
+        driver = _Driver(run, len(system), limits.clusters, started, progress, keys)
+        try:
+            stopped = driver.drive(*limits.numbers())
+        except KeyboardInterrupt:
+            if keys.impatient:
+                raise
+            driver.interrupted = True
+            stopped = "interrupted"
     trace = run.trace()
     trace.stopped = trace.stopped or stopped
     wall = clock.perf_counter() - started
-    tree = _result(system, chosen, trace, output, wall, driver.compile_seconds)
+    tree = _result(system, method, trace, output, wall, driver.compile_seconds)
     if driver.interrupted:
         raise Interrupted(f"stopped with {run.clusters} clusters left", tree)
     return tree
@@ -151,9 +180,11 @@ def simulate(
 class _Driver:
     """Calls a run slice by slice."""
 
-    def __init__(self, run: Run, discs: int, target: int, started: float, progress: Any) -> None:
+    def __init__(
+        self, run: Run, discs: int, target: int, started: float, progress: Any, keys: CtrlC
+    ) -> None:
         self.run, self.discs, self.target = run, discs, target
-        self.started, self.progress = started, progress
+        self.started, self.progress, self.keys = started, progress, keys
         self.compile_seconds = 0.0
         self.interrupted = False
 
@@ -161,6 +192,7 @@ class _Driver:
         """Go on to the end; return why it was not the goal, or nothing."""
         told = self.started
         while (code := self._slice(until, most, limit)) is None:
+            self.keys.check()
             now = clock.perf_counter()
             if now - told > _TICK:
                 told = now
@@ -192,10 +224,11 @@ class _Driver:
         )  # fmt: skip
 
 
-def _checked(
+def checked(
     system: Any, method: Any, until: Any, clusters: Any, times: Any, max_events: Any,
     time_limit: Any, progress: Any,
 ) -> tuple[SpatialMethod, Float | None]:  # fmt: skip
+    """Return the method and the output times, or raise an `InputError` with every mistake."""
     problems: list[str] = []
     if not isinstance(system, System):
         problems.append(

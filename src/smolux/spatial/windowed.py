@@ -53,10 +53,28 @@ class _State:
     bound: Callable[[int], Float]
 
 
+def _left_behind(before: Trace, system: System, room: Float) -> _State:
+    """Return the clusters that a run left behind."""
+    names, which = np.unique(before.cluster, return_inverse=True)
+    order = np.argsort(which, kind="stable")
+    starts = np.searchsorted(which[order], np.arange(len(names)))
+    x, d = before.position, system.dimension
+
+    def bound(k: int) -> Float:
+        if k < d:
+            return np.minimum.reduceat((x[:, k] - room)[order], starts)
+        return np.maximum.reduceat((x[:, k - d] + room)[order], starts)
+
+    everyone = np.arange(len(x), dtype=np.int32)
+    mass = np.bincount(which, system.mass).astype(np.float64)
+    # a cluster has the name of one of its discs
+    return _State(x, everyone, which.astype(np.int32), before.velocity[names], mass, bound)
+
+
 class WindowedRun(Run):
     """A run of the windowed method."""
 
-    def __init__(self, system: System, settings: Windowed) -> None:
+    def __init__(self, system: System, settings: Windowed, before: Trace | None = None) -> None:
         from .events import direct, flight, packing
 
         self.system, self.settings = system, settings
@@ -82,12 +100,18 @@ class WindowedRun(Run):
         self.clock[flight.SKIN] = min(settings.skin or _SKIN * spacing, thickest)
         room = system.radius if system.wall_contact == "surface" else np.zeros(n)
         everyone = np.arange(n, dtype=np.int32)
-        self.flight = self._packed(
-            _State(
-                system.position, everyone, everyone, system.velocity, system.mass,
-                lambda k: system.position[:, k % d] + (room if k >= d else -room),
-            )
+        state = _State(
+            system.position, everyone, everyone, system.velocity, system.mass,
+            lambda k: system.position[:, k % d] + (room if k >= d else -room),
         )  # fmt: skip
+        if before is not None:
+            state = _left_behind(before, system, room)
+            self.logger.take(before.log)
+            merges = before.log.time[before.log.merges]
+            self.count[flight.CLUSTERS] = len(state.mass)
+            self.clock[flight.TIME] = before.time
+            self.clock[flight.LATEST] = merges[-1] if len(merges) else 0.0
+        self.flight = self._packed(state)
 
     def _packed(self, state: _State) -> Any:
         """Return a flight with discs in the order of space, in blocks; nothing is listed yet."""
@@ -284,6 +308,6 @@ class Windowed(SpatialMethod):
     title: ClassVar[str] = "pairs that may meet within a window of time"
     reference: ClassVar[str] = "this package; see the theory of ballistic aggregation"
 
-    def start(self, system: System, times: Float) -> Run:
-        """See `SpatialMethod.start`."""
-        return WindowedRun(system, self)
+    def start(self, system: System, times: Float, before: Trace | None = None) -> Run:
+        """See `SpatialMethod.start`; goes on from what an earlier run left behind."""
+        return WindowedRun(system, self, before)
