@@ -8,6 +8,7 @@ from command import call
 from smolux import results
 from smolux.case import load, spatial
 from smolux.errors import InputError
+from smolux.spatial import simulate
 
 CASE = """\
 title = "few discs"
@@ -81,6 +82,58 @@ def test_all_mistakes_at_once_with_their_lines(folder):
         load("few.toml")
 
 
-def test_what_is_not_finished_is_begun_again(folder):
+def test_a_limit_is_told(folder):
     call("run", "few.toml", "--set", "spatial.max_events=5", "-o", "cut")
     assert "limit of 5 events" in call("show", "cut").stdout
+
+
+def test_what_was_interrupted_goes_on(folder):
+    whole = call("run", "few.toml").stdout
+    file = folder / "few" / "results.nc"
+    case = results.load(file).attrs["case"]
+    part = simulate(spatial.load("few.toml").run.system(), max_events=20)
+    part.attrs |= {"stopped": "interrupted", "case": case}
+    results.save(part, file)
+    again = call("run", "few")
+    assert "going on at t = " in again.stderr
+    assert "35 merges" in again.stdout
+    assert again.stdout.splitlines()[-1] == whole.splitlines()[-1]
+    before = file.read_bytes()
+    call("run", "few")
+    assert file.read_bytes() == before
+
+
+STEPS = ("--set", "spatial.method=time-stepping", "--set", "spatial.step=0.3")
+
+
+def test_time_steps_need_times_and_have_settings_of_their_own(folder):
+    case = spatial.load("few.toml", [*STEPS[1::2], "spatial.times=[1, 10]", "spatial.rigid=true"])
+    given = case.run.arguments()
+    assert (given["method"].step, given["method"].rigid) == (0.3, True)
+    assert given["times"] == (1.0, 10.0)
+    (folder / "steps.toml").write_text(case.to_toml())
+    assert spatial.load("steps.toml") == case
+    assert "spatial.times is missing" in call("check", "few.toml", *STEPS, code=2).stderr
+    for change, words in (
+        ("spatial.step=0.7", "must lie above 0 and be 0.5 at most"),
+        ('spatial.times=["1 s"]', "a box has no units"),
+        ("spatial.times=[2, 1]", "ascending"),
+    ):
+        mistakes = call("check", "steps.toml", "--set", change, code=2).stderr
+        assert words in mistakes, change
+    assert (
+        "only the method" in call("check", "few.toml", "--set", "spatial.step=0.3", code=2).stderr
+    )
+
+
+@pytest.mark.slow
+def test_a_run_by_time_steps(folder):
+    run = call("run", "few.toml", *STEPS, "--set", "spatial.times=[0, 1, 2]", "-o", "steps")
+    assert "35 merges" in run.stdout
+    assert "no trajectory.xyz" in run.stderr  # its log does not determine the motion
+    assert (folder / "steps" / "discs.png").is_file()
+    tree = results.load(folder / "steps" / "results.nc")
+    assert tree["series/clusters"].values[0] == 36
+    assert '"step": 0.3' in tree.attrs["method_settings"]
+    assert call("show", "steps").stdout == run.stdout
+    call("plot", "steps", "-k", "pair-distribution", "-k", "box-dimension")

@@ -98,6 +98,34 @@ def test_figures(result):
         plotting.discs(result, colour="red")
 
 
+def test_figures_of_order_and_of_dimensions(result):
+    order = sp.pair_distribution(result)
+    figure = plotting.pair_distribution(order, label="one")
+    plotting.pair_distribution(order, ax=figure.axes[0], label="two")
+    one, two = figure.axes[0].lines
+    np.testing.assert_array_equal(one.get_ydata(), order["g"])
+    np.testing.assert_allclose(one.get_xdata() * 2 * result["radius"].values[0], order["r"])
+    assert one.get_color() != two.get_color()
+    boxes = sp.box_dimension(result)
+    size = np.array([5.0, 30, 60, 90, 200])
+    mass = sp.Dimension(1.6, 1.5, 1.7, size, 2 * size ** (1 / 1.6), size > 10, 1 / 1.6, np.log(2))
+    for fit in (boxes, mass):
+        ax = plotting.dimension(fit).axes[0]
+        outside, inside, line = ax.lines
+        assert len(outside.get_xdata()) == (~fit.used).sum()
+        np.testing.assert_array_equal(inside.get_ydata(), fit.y[fit.used])
+        slope = np.polyfit(np.log(line.get_xdata()), np.log(line.get_ydata()), 1)[0]
+        assert slope == pytest.approx(fit.slope)
+        assert f"{fit.low:.3f} to {fit.high:.3f}" in ax.texts[0].get_text()
+    shaded = ax.collections[0].get_paths()[0].vertices
+    assert shaded[:, 1].max() == pytest.approx(
+        2 * 200 ** (1 / 1.6) * (200 / np.exp(np.log(size[1:]).mean())) ** (1 / 1.5 - 1 / 1.6)
+    )
+    for wrong in (plotting.pair_distribution, plotting.dimension):
+        with pytest.raises(sx.InputError, match="must be what"):
+            wrong(result["series"].to_dataset())
+
+
 def test_a_disc_that_touched_nothing_is_grey(result):
     first = result["first_contact"].values
     time = float(np.median(first))

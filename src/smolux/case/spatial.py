@@ -9,16 +9,22 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import InputError
 from . import contents, read_text
 from .reader import Problems, Table, show
+from .settings import read_times
 from .write import to_toml
 
 if TYPE_CHECKING:
     from ..spatial import System
 
 #: figures of a run in space, by the names of `smolux.cli`
-FIGURES = ("discs", "coarsening", "spatial-kernel")
+FIGURES = (
+    "discs", "coarsening", "spatial-kernel", "pair-distribution", "box-dimension", "mass-dimension",
+)  # fmt: skip
 _TRAJECTORIES = ("none", "xyz", "gsd")
+#: settings that only time stepping has
+_STEPPING = ("step", "rigid")
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,9 @@ class Flight:
     radius_sigma: float = 1.0
     seed: int | None = None
     method: str = "windowed"
+    step: float | None = None
+    rigid: bool | None = None
+    times: tuple[float, ...] | None = None
     clusters: int = 1
     until: float | None = None
     max_events: int | None = None
@@ -65,8 +74,13 @@ class Flight:
 
     def arguments(self) -> dict[str, Any]:
         """Arguments of `smolux.spatial.simulate` beside the system."""
-        names = ("method", "clusters", "until", "max_events", "time_limit")
-        return {name: getattr(self, name) for name in names}
+        from ..spatial.methods import METHODS
+
+        names = ("times", "clusters", "until", "max_events", "time_limit")
+        given = {name: getattr(self, name) for name in _STEPPING}
+        settings = {name: value for name, value in given.items() if value is not None}
+        method = next(m for m in METHODS if m.name == self.method)(**settings)
+        return {"method": method} | {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -153,7 +167,10 @@ def _read_flight(content: Any, problems: Problems) -> Flight | None:
         "temperature": table.number("temperature", Flight.temperature, above=0.0),
         "radius_sigma": table.number("radius_sigma", Flight.radius_sigma, 1.0),
         "seed": table.integer("seed", None, 0),
-        "method": table.choice("method", Flight.method, [m.name for m in METHODS if m.exact]),
+        "method": table.choice("method", Flight.method, [m.name for m in METHODS]),
+        "step": table.number("step", None, above=0.0),
+        "rigid": table.flag("rigid", False) if "rigid" in table else None,
+        "times": read_times(table) if "times" in table else None,
         "clusters": table.integer("clusters", Flight.clusters, 1),
         "until": table.number("until", None, above=0.0),
         "max_events": table.integer("max_events", None, 1),
@@ -164,7 +181,26 @@ def _read_flight(content: Any, problems: Problems) -> Flight | None:
     if len(settings["walls"]) not in (1, settings["dimension"]):
         table.bad("walls", f"one word, or one for each of {settings['dimension']} axes")
     table.finish()
-    return Flight(**settings)
+    flight = Flight(**settings)
+    _check_method(flight, table)
+    return flight
+
+
+def _check_method(flight: Flight, table: Table) -> None:
+    """Note settings that the method does not have, does not take, or lacks."""
+    if table.problems.check_units():
+        table.bad("times", "a box has no units: give numbers")
+    if flight.method == "time-stepping":
+        if "times" not in table:
+            table.require("times", "a run by time steps is observed on its way; give a list")
+        try:
+            flight.arguments()
+        except InputError as error:
+            table.problems.add_error(table.path, error, _STEPPING)
+        return
+    for key in _STEPPING:
+        if key in table:
+            table.bad(key, 'only the method "time-stepping" has it')
 
 
 def _read_walls(table: Table) -> tuple[str, ...]:

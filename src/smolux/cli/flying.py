@@ -40,17 +40,17 @@ def run(case: SpatialCase, path: Path, output: Path | None) -> None:
         case = case.with_seed()
         directory = rundir.create(case, path, output)
     say(f"seed {case.run.seed}, folder {directory.path}")
-    tree = _finished(directory, case)
-    if tree is None:
-        tree = _simulate(case, directory)
+    tree = _stored(directory, case)
+    if tree is None or tree.attrs.get("stopped") == "interrupted":
+        tree = _simulate(case, directory, tree)
     typer.echo(text(tree))
     for remark in _write_output(case, tree, directory.path):
         say(remark)
     say(f"results and figures are in {directory.path}")
 
 
-def _finished(directory: RunDirectory, case: SpatialCase) -> Any:
-    """Load the results of a run that came to its end; None if there are none."""
+def _stored(directory: RunDirectory, case: SpatialCase) -> Any:
+    """Load what a run has reached; None if there is nothing."""
     if not directory.results.is_file():
         return None
     tree = results.load(directory.results)
@@ -59,20 +59,28 @@ def _finished(directory: RunDirectory, case: SpatialCase) -> Any:
         raise InputError(
             f"{directory.path}: its results are of another case; run the case file anew"
         )
-    return tree if tree.attrs.get("stopped") != "interrupted" else None
+    return tree
 
 
-def _simulate(case: SpatialCase, directory: RunDirectory) -> Any:
-    system = case.run.system()
+def _simulate(case: SpatialCase, directory: RunDirectory, before: Any) -> Any:
+    """Run to the end, from what was reached before if the method can go on from there."""
+    arguments = case.run.arguments()
+    exact = arguments["method"].exact
+    if before is None or not exact:
+        begun = partial(spatial.simulate, case.run.system())
+    else:
+        say(f"going on at t = {before.attrs['time_reached']:.6g}")
+        begun = partial(spatial.resume, before)
+        del arguments["method"]
     with Stopper() as stopper, Display(stopper.check) as progress:
         stopper.patient = True
         try:
-            tree = spatial.simulate(system, progress=progress, **case.run.arguments())
+            tree = begun(progress=progress, **arguments)
         except Interrupted as stop:
             _store(stop.dataset, case, directory)
             raise Interrupted(
                 f"{stop}; what was reached is in {directory.results}\n"
-                f"begin again with: smolux run {directory.path}"
+                f"{'go on' if exact else 'begin again'} with: smolux run {directory.path}"
             ) from None
     _store(tree, case, directory)
     say(f"simulated in {duration(float(tree.attrs['wall_seconds']))}")
@@ -130,6 +138,9 @@ def draw(name: str, tree: Any) -> Any:
         "discs": plotting.discs,
         "coarsening": plotting.coarsening,
         "spatial-kernel": lambda t: plotting.spatial_kernel(spatial.measured_kernel(t)),
+        "pair-distribution": lambda t: plotting.pair_distribution(spatial.pair_distribution(t)),
+        "box-dimension": lambda t: plotting.dimension(spatial.box_dimension(t)),
+        "mass-dimension": lambda t: plotting.dimension(spatial.mass_dimension(t)),
     }
     if name not in kinds:
         raise InputError(f"--kind {name}: no such figure{did_you_mean(name, FIGURES)}")

@@ -16,7 +16,8 @@ def plot(
             "--kind",
             "-k",
             help="clusters, moments, size-distribution, oscillations or scaling; of a run in space "
-            "discs, coarsening or spatial-kernel. May be repeated.",
+            "discs, coarsening, spatial-kernel, pair-distribution, box-dimension or "
+            "mass-dimension. May be repeated.",
         ),
     ] = None,
     output: Annotated[

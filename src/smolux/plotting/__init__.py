@@ -9,6 +9,7 @@ from .comparison import comparison
 from .distribution import size_distribution
 from .efficiency import efficiency
 from .mean_field import mean_field
+from .morphology import dimension, pair_distribution
 from .movie import movie
 from .oscillation import oscillations
 from .scaling import scaling
@@ -22,12 +23,14 @@ __all__ = [
     "clusters",
     "coarsening",
     "comparison",
+    "dimension",
     "discs",
     "efficiency",
     "mean_field",
     "moments",
     "movie",
     "oscillations",
+    "pair_distribution",
     "save",
     "scaling",
     "size_distribution",
