@@ -83,6 +83,18 @@ def test_the_replicas_are_those_of_simulate(q: float):
     assert float(found["collisions"]) * 203 == pytest.approx(ds.attrs["events"], rel=1e-12)
 
 
+def test_a_run_whose_stores_grow_leaves_no_wrong_tables():
+    """With the loop of the law tests; the first run learns tables for twice as many slots."""
+    kernel = sx.kernels.formula("c0 + c1*(i + j) + c2*i*j", c0=0.0, c1=1.0, c2=0.0)
+    model = sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(0.0)])
+    settings: dict[str, Any] = {"method": "low-rank", "population": "none", "particles": 60}
+    settings |= {"replicas": 100, "seed": 3}
+    found = sx.ensemble(model, [3.0], ["M2"], **settings, threads=1)
+    rows = sx.simulate(model, [3.0], **settings)
+    assert float(found["collisions"]) == rows["collisions"].mean()
+    np.testing.assert_allclose(found["mean"], rows["moment"].sel(order=[2]).mean("replica").T)
+
+
 def test_initial_sizes_that_are_drawn_are_those_of_simulate():
     model = sx.Model(kernel=sx.kernels.Constant(), initial=sx.initial.exponential(mean=3.0))
     settings: dict[str, Any] = {"method": METHOD, "weighting": power(0.0), "particles": 50}

@@ -106,7 +106,8 @@ class Sampler:
         one, many = (work._asdict() for work in works)
         self._tables = {k for k in one if np.shape(one[k]) == np.shape(many[k])}
         known = {k: getattr(learnt, k) for k in self._tables}
-        grown = any(np.shape(known[k]) != np.shape(one[k]) for k in known)
+        # tables may be about stores of a certain length: those of a run that grew are no use
+        grown = any(np.shape(getattr(learnt, k)) != np.shape(one[k]) for k in one)
         self._work = works[1] if grown else works[1]._replace(**known)
 
     def start(self, first: int, count: int) -> Group:
