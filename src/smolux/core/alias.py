@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .compile import cold_piece, piece
+from .compile import at, cold_piece, piece
 
 
 @cold_piece
@@ -54,5 +54,5 @@ def outcome(share, alias, n, x):
     """Outcome of a table of `n` columns for a uniform number."""
     x *= n
     k = np.int64(x)
-    other = np.int64(alias[k])  # read in any case: a choice costs less than a branch
-    return k if x - k < share[k] else other
+    other = np.int64(alias[at(k)])  # read in any case: a choice costs less than a branch
+    return k if x - k < share[at(k)] else other

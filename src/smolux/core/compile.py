@@ -53,6 +53,9 @@ _NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 #: raised whenever what an entry holds changes
 _FORMAT = 2
 
+#: makes an index that is never negative: others may count from the end, which costs instructions
+at = np.uint64
+
 #: compile seconds and cache hits of this process, for reports
 statistics = {"hits": 0, "misses": 0}
 

@@ -6,24 +6,27 @@ the pool need not be larger than all lists together, but for one chunk each.
 
 from __future__ import annotations
 
-from .compile import piece
+import numpy as np
+
+from .compile import at, piece
 
 
 @piece
 def place_of(where, g, slot, bits):
     """Place in the pool of an entry of list `g`."""
-    return (where[g, slot >> bits] << bits) + (slot & ((1 << bits) - 1))
+    chunk = np.int64(where[at(g), at(slot >> bits)])
+    return (chunk << bits) + (slot & ((1 << bits) - 1))
 
 
 @piece
 def take_chunk(where, free, left, g, chunk):
     """Give list `g` its next chunk; `left` are free before, one less is returned."""
-    where[g, chunk] = free[left - 1]
+    where[at(g), at(chunk)] = free[at(left - 1)]
     return left - 1
 
 
 @piece
 def return_chunk(where, free, left, g, chunk):
     """Take a chunk of list `g` back; the number of free ones is returned."""
-    free[left] = where[g, chunk]
+    free[at(left)] = where[at(g), at(chunk)]
     return left + 1

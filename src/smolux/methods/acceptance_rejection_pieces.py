@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core import rng
 from ..core.burst import NOT_PLAIN, PLAIN, Burst
-from ..core.compile import cold_piece, piece
+from ..core.compile import at, cold_piece, piece
 from ..core.levels import renew_majorant
 from ..core.loop import Pieces, note_bad, note_largest, repair
 from ..core.prefetch import prefetch
@@ -33,7 +33,7 @@ from ..core.state import (
 _PATIENCE = 4096
 #: candidates whose pairs are drawn ahead, so that their memory is there when it is needed
 AHEAD = 8
-_ONE = np.uint64(1)
+_ONE = at(1)
 #: entries past the particles that may be written to
 SLACK = 2
 
@@ -81,7 +81,7 @@ def _view(w, r):
 def _size(w, monomers, slot):
     # read first, choose then: which kind comes is a coin toss that no branch predictor wins
     place = slot - monomers
-    size = w.sizes[np.uint64(max(place, 0))]
+    size = w.sizes[at(max(place, 0))]
     return size if place >= 0 else np.int64(1)
 
 
@@ -126,7 +126,7 @@ def _make_find(rate: Any) -> Any:
         unit = 2.0 * s.clock[VOLUME] / (float(n) * float(n - 1) * majorant * factor)
         waited, last = 0.0, trials + _PATIENCE
         while trials < last:
-            k = np.uint64(2 * (trials & (AHEAD - 1)))
+            k = at(2 * (trials & (AHEAD - 1)))
             trials += 1
             x, c0, c1, c2, c3 = rng.exponential_of(s.rng, c0, c1, c2, c3)
             waited += x
@@ -184,11 +184,11 @@ def _exchange(w, monomers, stored, a, b, size, count):
     first, second = np.int64(x >= 0), np.int64(y >= 0)
     monomers -= 2 - first - second
     if size > 1:
-        w.sizes[np.uint64(x if x >= 0 else y if y >= 0 else stored)] = size
+        w.sizes[at(x if x >= 0 else y if y >= 0 else stored)] = size
         stored += 1 - first - second
         # unless both were stored, the entry past the end is written over itself
         gap = y if x >= 0 and y >= 0 else stored
-        w.sizes[np.uint64(gap)] = w.sizes[np.uint64(stored)]
+        w.sizes[at(gap)] = w.sizes[at(stored)]
         return monomers, stored
     high, low = max(x, y), min(x, y)
     if high >= 0:

@@ -10,7 +10,7 @@ import numpy as np
 from ..core import rng
 from ..core.alias import outcome
 from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst
-from ..core.compile import cold_piece, piece
+from ..core.compile import at, cold_piece, piece
 from ..core.loop import Pieces, note_bad, repair
 from ..core.prefetch import prefetch
 from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, TRIALS, VOLUME
@@ -67,13 +67,13 @@ def _draw_ahead(w, words):
     """Draw candidates: they depend on the table alone, not on the events in between."""
     pairs = w.meta[PAIRS]
     for k in range(AHEAD):
-        classes = w.classes[outcome(w.share, w.alias, pairs, rng.uniform(words))]
+        classes = w.classes[at(outcome(w.share, w.alias, pairs, rng.uniform(words)))]
         g, h = np.int64(classes >> 16), np.int64(classes & 0xFFFF)
-        a, b = rng.below(words, w.room[g]), rng.below(words, w.room[h])
-        w.one[k], w.two[k] = (g << _SLOT_BITS) | a, (h << _SLOT_BITS) | b
-        if w.listed[g]:
+        a, b = rng.below(words, w.room[at(g)]), rng.below(words, w.room[at(h)])
+        w.one[at(k)], w.two[at(k)] = (g << _SLOT_BITS) | a, (h << _SLOT_BITS) | b
+        if w.listed[at(g)]:
             prefetch(w.pool, place(w, g, a))
-        if w.listed[h]:
+        if w.listed[at(h)]:
             prefetch(w.pool, place(w, h, b))
     w.meta[NEXT] = 0
 
@@ -91,16 +91,16 @@ def _make_find(rate: Any) -> Any:
     @piece
     def accepts(s, w, g, h, i, j, u, p):
         """Whether the rate accepts a candidate: 1 or 0; -1 if there is no rate."""
-        if u < w.low[g, h]:
+        if u < w.low[at(g), at(h)]:
             return 1
         value = rate(float(i), float(j), *p)
-        if not 0.0 <= value <= w.high[g, h]:
+        if not 0.0 <= value <= w.high[at(g), at(h)]:
             if not 0.0 <= value < math.inf:
                 note_bad(s, i, j, value)
                 return -1
             _raise_bound(s, w, g, h, i, j, value)
             return 1
-        return 1 if u * w.high[g, h] < value else 0
+        return 1 if u * w.high[at(g), at(h)] < value else 0
 
     @piece
     def find(s, w, p, factor, held, n, trials, c0, c1, c2, c3):
@@ -117,9 +117,9 @@ def _make_find(rate: Any) -> Any:
             trials += 1
             x, c0, c1, c2, c3 = rng.exponential_of(s.rng, c0, c1, c2, c3)
             waited += x
-            one, two = w.one[k], w.two[k]
+            one, two = w.one[at(k)], w.two[at(k)]
             g, a, h, b = one >> _SLOT_BITS, one & _SLOT, two >> _SLOT_BITS, two & _SLOT
-            if a >= w.number[g] or b >= w.number[h] or one == two:
+            if a >= w.number[at(g)] or b >= w.number[at(h)] or one == two:
                 continue
             u, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)
             i, j = size_at(w, g, a), size_at(w, h, b)

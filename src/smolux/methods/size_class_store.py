@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.compile import cold_piece, piece
+from ..core.compile import at, cold_piece, piece
 from ..core.pool import place_of, return_chunk, take_chunk
 from ..core.slots import slot_of
 from ..core.state import PARTICLES
@@ -118,18 +118,18 @@ def place(w, g, slot):
 @piece
 def size_at(w, g, slot):
     """Size of a particle."""
-    if not w.listed[g]:
+    if not w.listed[at(g)]:
         return np.int64(g)
-    return np.int64(w.pool[place(w, g, slot)])
+    return np.int64(w.pool[at(place(w, g, slot))])
 
 
 @piece
 def remove(w, g, slot):
     """Take a particle out: the last of its class moves into the gap."""
-    last = w.number[g] - 1
-    w.number[g] = last
-    if w.listed[g]:
-        w.pool[place(w, g, slot)] = w.pool[place(w, g, last)]
+    last = w.number[at(g)] - 1
+    w.number[at(g)] = last
+    if w.listed[at(g)]:
+        w.pool[at(place(w, g, slot))] = w.pool[at(place(w, g, last))]
         bits = w.meta[CHUNK]
         if last & ((1 << bits) - 1) == 0:
             w.meta[FREE] = return_chunk(w.where, w.free, w.meta[FREE], g, last >> bits)
@@ -139,24 +139,24 @@ def remove(w, g, slot):
 def append(w, g, size):
     """Put a particle at the end of a list; there must be a free chunk."""
     bits = w.meta[CHUNK]
-    slot = w.number[g]
+    slot = w.number[at(g)]
     if slot & ((1 << bits) - 1) == 0:
         w.meta[FREE] = take_chunk(w.where, w.free, w.meta[FREE], g, slot >> bits)
-    w.pool[place(w, g, slot)] = size
-    w.number[g] = slot + 1
+    w.pool[at(place(w, g, slot))] = size
+    w.number[at(g)] = slot + 1
 
 
 @piece
 def insert(w, size, count):
     """Put particles of one size in; there must be free chunks."""
     g = slot_of(size, w.meta[BITS])
-    if w.listed[g]:
+    if w.listed[at(g)]:
         for _ in range(count):
             append(w, g, size)
     else:
-        w.number[g] += count
-    w.flow[g] += SHARE * count
-    if w.number[g] > w.room[g]:
+        w.number[at(g)] += count
+    w.flow[at(g)] += SHARE * count
+    if w.number[at(g)] > w.room[at(g)]:
         w.meta[STALE] = 1
 
 
@@ -166,9 +166,9 @@ def chunks_for(w, size, count):
     g = slot_of(size, w.meta[BITS])
     if g >= w.number.shape[0] or size > w.meta[WIDEST]:
         return w.meta[FREE] + 1
-    if not w.listed[g]:
+    if not w.listed[at(g)]:
         return 0
-    if (w.number[g] + count) >> w.meta[CHUNK] >= w.where.shape[1]:
+    if (w.number[at(g)] + count) >> w.meta[CHUNK] >= w.where.shape[1]:
         return w.meta[FREE] + 1
     return (count >> w.meta[CHUNK]) + 1
 
