@@ -26,7 +26,7 @@ from .common import (
 )
 
 #: replicas at N = 128 and 1024; direct simulation has the largest variance and needs more
-_REPLICAS = {"constant": 150_000, "additive": 12_000}
+_REPLICAS = {"constant": 30_000, "additive": 5_000}
 _MORE = {"MMF": 6, "MMF doubling": 3}
 _ALGORITHMS = {
     "constant": ("MMF", "MMF doubling", "MFA", "WA q=0.5", "WA q=1", "WA q=1.25"),

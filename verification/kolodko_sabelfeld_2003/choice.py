@@ -28,7 +28,7 @@ SCHEMES: dict[str, Any] = {
 }
 SIZES = (1, 2, 3, 5, 8, 12, 20, 30, 50, 80, 120, 200, 300)
 MOMENTS = ("number_density", "M2", "M3")
-PARTICLES, REPLICAS = 1000, 3000
+PARTICLES, REPLICAS = 1000, 2000
 _KEPT = ("ratio", "ratio_lower", "ratio_upper", "best", "reference", "cost")
 #: densities with fewer simulated particles in all replicas are left out
 _FEW = 100

@@ -22,7 +22,7 @@ from .common import (
 )
 
 #: simulated particles of a cell, all replicas together
-_PARTICLES = 3e6
+_PARTICLES = 1e6
 _ROUNDS = 3
 
 
@@ -36,7 +36,7 @@ def compute(name: str, quick: bool) -> dict[str, Any]:
             algorithm: {
                 n: measure(
                     table["kernel"], algorithm, ["number_density"], [table["time"]], n,
-                    max(int(most / n), 60), rounds=_ROUNDS,
+                    max(int(most / n), 30), rounds=_ROUNDS,
                 )
                 for n in sizes
             }
