@@ -1,5 +1,6 @@
 """What results say: means and intervals, agreement, oscillations, gelation, scaling."""
 
+from .by_rates import densities_by_rates
 from .compare import compare
 from .gathering import format_sweep, sweep_table
 from .gelation import gel_fraction, gelation
@@ -13,6 +14,7 @@ from .table import format_table, tables
 
 __all__ = [
     "compare",
+    "densities_by_rates",
     "exact_dataset",
     "extrema",
     "format_sweep",
