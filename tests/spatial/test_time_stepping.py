@@ -167,6 +167,12 @@ def test_failures_are_counted_and_the_run_goes_on_with_shorter_steps():
     assert worst_overlap(wild) < 1.1e-3
 
 
+def test_short_steps_in_a_dense_system_do_not_fail():
+    """What is pushed moves as far as in long ones, further than its neighbours were known for."""
+    s = sp.lattice(2500, 0.5, seed=3)
+    assert sp.simulate(s, TimeStepping(step=0.1), times=[0.0]).attrs["failures"] == 0
+
+
 def test_nothing_moves():
     s = sp.System([[1, 1], [3, 3]], [[0, 0], [0, 0]], radius=0.5, box=4)
     assert "nothing moves" in sp.simulate(s, "time-stepping", times=[0.0]).attrs["stopped"]

@@ -31,6 +31,8 @@ _FORMS, _CONSTRAINTS = ("augmented", "damped", "plain"), ("non-smooth", "smooth"
 _NAMES = ("alpha", "beta", "damping", "augmentation")
 #: the relative way of two discs in a step must stay below a radius
 _LONGEST_STEP = 0.5
+#: neighbours are known for steps of this length at least
+_LEAST_REACH = 0.2
 #: room for pairs and for half-edges, by disc
 _PAIRS, _EDGES = 4, {2: 6, 3: 12}
 _HOPELESS = (
@@ -86,7 +88,8 @@ class SteppingRun(Run):
         widest = clock[steps.WIDEST] = 2 * float(system.radius.max())
         # without a penalty new links first pull discs together
         far = 0.2 if self.settings.coefficients()[-1] > 0 else 1.2
-        clock[steps.REACH] = 1 + far + 2 * self.settings.step
+        # in short steps, too, what is pushed moves as far
+        clock[steps.REACH] = 1 + far + 2 * max(self.settings.step, _LEAST_REACH)
         # lists last for a step and for what a minimisation moves
         thinnest = widest * (clock[steps.REACH] - 1 + 2 * self.settings.step)
         thickest = max(max(system.box.lengths) / 4, thinnest)
