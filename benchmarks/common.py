@@ -95,6 +95,7 @@ python benchmarks/solver.py
 python benchmarks/flat_low_rank.py
 python benchmarks/osinsky_2022.py
 python benchmarks/kolodko_2003.py
+python benchmarks/estimators.py
 python benchmarks/auto.py
 ```
 """
