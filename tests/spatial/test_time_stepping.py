@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 import smolux.spatial as sp
 from smolux import InputError
-from smolux.spatial import TimeStepping
+from smolux.spatial import TimeStepping, time_stepping
 
 
 def worst_overlap(result: xr.DataTree) -> float:
@@ -171,6 +171,14 @@ def test_short_steps_in_a_dense_system_do_not_fail():
     """What is pushed moves as far as in long ones, further than its neighbours were known for."""
     s = sp.lattice(2500, 0.5, seed=3)
     assert sp.simulate(s, TimeStepping(step=0.1), times=[0.0]).attrs["failures"] == 0
+
+
+def test_the_compiled_loop_can_be_kept():
+    """A loop that is given a compiled function as a value is compiled in every process anew."""
+    sp.simulate(sp.lattice(16, 0.2, seed=2), "time-stepping", times=[0.0])
+    compiled = list(time_stepping._loop(2).overloads.values())
+    assert compiled
+    assert not any(c.library.has_dynamic_globals for c in compiled)
 
 
 def test_nothing_moves():

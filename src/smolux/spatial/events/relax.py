@@ -80,8 +80,8 @@ def root(s, c):
     return np.int64(c)
 
 
-def bind(d):
-    """Bind the pieces for `d` dimensions."""
+def bind(d, look):
+    """Bind the pieces for `d` dimensions; `look` finds the contacts."""
 
     @piece
     def overlap_of(s, i, j, n):
@@ -383,7 +383,7 @@ def bind(d):
         return commit(s, local) if code == PARTED else code
 
     @cold_piece
-    def part(s, local, recipe, look, n):
+    def part(s, local, recipe, n):
         """Part all that overlap, and what they then overlap, until nothing new does."""
         begin = np.int64(0)
         for _ in range(_PASSES):

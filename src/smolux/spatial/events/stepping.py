@@ -40,7 +40,7 @@ _HALVINGS = 24
 def bind(d):
     """Bind the loop for `d` dimensions."""
     list_pairs, choose_skin, look, fly, take_back, merge = steps.bind(d)
-    part, settle, overlap_of = relax.bind(d)
+    part, settle, overlap_of = relax.bind(d, look)
 
     @piece
     def speeds(s):
@@ -83,7 +83,7 @@ def bind(d):
         look(s)
         code = PARTED
         if s.count[CONTACTS] > 0:
-            code = part(s, local, recipe, look, n)
+            code = part(s, local, recipe, n)
             if code == PARTED:
                 done = merge_all(s, recipe, log, done, s.clock[TIME] + dt, n)
             settle(s, local, code == PARTED)
