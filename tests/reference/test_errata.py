@@ -610,3 +610,26 @@ class TestTheorem:
         pairs = 0.5 * np.array([k % 2 for k in range(n)])  # of K_ij delta_ij over i + j = l
         first = pairs - p @ lost
         assert np.abs(slope - (correct - first / n)).max() > 1e-3
+
+
+class TestSamples:
+    """Entry 23: the statistical error of rare sizes, from the number to be expected."""
+
+    @pytest.mark.parametrize(
+        ("kernel", "size", "time", "weight", "particles", "samples", "printed", "factor"),
+        [
+            ("constant", 21, 8.0, 1, 340, 6_500_000, 0.298, 1.0),
+            ("constant", 50, 20.0, 1, 400, 2_700_000, 1.058, 1.0),
+            ("constant", 50, 20.0, 50, 24, 1_000_000, 1.006, 1.0),
+            ("additive", 70, 3.0, 1, 802, 48_500_000, 0.298, 1.0),
+            ("additive", 70, 3.0, 70, 48, 1_200_000, 0.296, 3.2),
+        ],
+    )
+    def test_rare_sizes(
+        self, kernel: str, size: int, time: float, weight: int, particles: int, samples: int,
+        printed: float, factor: float,
+    ) -> None:  # fmt: skip
+        solution = exact.Additive(scale=0.5) if kernel == "additive" else exact.Constant()
+        expected = weight * particles * solution.densities([time], [size]).item()
+        statistical = 300 / math.sqrt(expected * samples)
+        assert statistical / printed == pytest.approx(factor, rel=0.1)

@@ -164,7 +164,7 @@ def within(what: str, ratios: Sequence[float], low: float, high: float, why: str
     """Check that all ratios, ours over the expected one, are in a range."""
     x = np.asarray(ratios, float)
     spread = f"{x.min():.3g} to {x.max():.3g}" if x.size > 1 else f"{x[0]:.3g}"
-    allowed = f"{low:g} to {high:g} {why}".strip()
+    allowed = f"{low:g} to {high:g} {why}".strip() if high < np.inf else f"≥ {low:g} {why}".strip()
     return Check(what, spread, "1", allowed, bool(x.min() >= low and x.max() <= high))
 
 

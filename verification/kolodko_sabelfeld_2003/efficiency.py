@@ -30,6 +30,8 @@ _PARTICLES = {
     "constant": {"MMF": 30e6, "MMF doubling": 20e6, "": 10e6},
     "additive": {"MMF": 8e6, "MMF doubling": 4e6, "": 3e6},
 }
+#: where few particles have a faster method than the one estimated to be
+_METHOD = {("additive", "MFA"): "low-rank"}
 #: turns of a table: what disturbs some of them does not disturb the median of the costs
 _ROUNDS = 3
 #: bias, in per cent, up to which statistical errors are compared with the paper's
@@ -63,8 +65,9 @@ def compute(names: tuple[str, ...], quick: bool) -> dict[str, Any]:
                 continue
             replicas = _replicas(table["kernel"], row, quick)
             ours = measure(
-                table["kernel"], algorithm, observables, times, n, replicas, rounds=_ROUNDS
-            )
+                table["kernel"], algorithm, observables, times, n, replicas, rounds=_ROUNDS,
+                method=_METHOD.get((table["kernel"], algorithm)),
+            )  # fmt: skip
             for key in ("mean", "error", "variance", "variance_error"):
                 ours[key] = ours[key][0]
             if algorithm == "MMF":
@@ -178,19 +181,27 @@ def _laws(names: tuple[str, ...], tables: dict[str, dict[str, _Row]]) -> list[Ch
         return []
     many, few = (tables[name] for name in names)
     both = [a for a in many if a in few]
-    scores, ratios = [], []
+    scores, ratios, allowed = [], [], []
     for a in both:
         one, two = many[a], few[a]
         n, m = one.paper["N"], two.paper["N"]
         error = np.hypot(n * one.error[-1], m * two.error[-1])
         scores.append((n * one.bias[-1] - m * two.bias[-1]) / error)
-        ratios.append(n * one.statistical**2 * one.paper["M"]
-                      / (m * two.statistical**2 * two.paper["M"]))  # fmt: skip
+        ratios.append(
+            n * one.statistical**2 * one.paper["M"] / (m * two.statistical**2 * two.paper["M"])
+        )
+        allowed.append(0.1 + 2 / m)
+    far = max(abs(r - 1) / most for r, most in zip(ratios, allowed, strict=True))
     return [
         worst("N times the bias, the same in both tables, all algorithms", scores),
-        within("N times the variance, one table over the other, all algorithms", ratios,
-               0.9, 1.1, "(terms of higher order in 1/N are left)"),
-    ]  # fmt: skip
+        Check(
+            "N times the variance, one table over the other, all algorithms",
+            f"{min(ratios):.3g} to {max(ratios):.3g}",
+            "1",
+            "within 10 % and 2/N of the smaller N (terms of higher order in 1/N are left)",
+            bool(far <= 1),
+        ),
+    ]
 
 
 def _orders(names: tuple[str, ...], tables: dict[str, dict[str, _Row]]) -> list[Check]:
@@ -289,6 +300,7 @@ def _figure(names: tuple[str, ...], data: dict[str, Any]) -> Any:
     for ax in (left, right):
         ax.set_xticks(range(len(labels)), [_SHORT[a] for a in labels])
         ax.tick_params(axis="x", which="both", length=0)
+        ax.set_xlim(-0.5, len(labels) - 0.5)
     left.set_ylabel("$N$ × relative bias")
     right.set_ylabel("efficiency over that of MMF")
     handles, texts = (
@@ -315,7 +327,7 @@ def present(names: tuple[str, ...], data: dict[str, Any]) -> Outcome:
         ran=f"{_case(table)}: the algorithms and N of the paper, {count(samples)} replicas in all.",
         checks=_checks(names, data),
         tables=[_table(n, tables[n], law[n], np.asarray(data[n]["exact"])) for n in names],
-        notes=_NOTES,
+        notes=_NOTES + _MORE.get(names[0], []),
         figure=_figure(names, data),
         caption=caption,
     )
@@ -334,6 +346,14 @@ _NOTES = [
     "WA: a particle is taken out, or two, by one uniform number here and by two independent ones "
     "in the paper. Means are those of the same equation; the variance of M2 is smaller here.",
 ]
+
+
+_MORE = {
+    "table4_9": [
+        "MFA: the paper's M is ten times too small for its St, see the errata; with 12 000 000 "
+        "samples its advantage over MMF would be 3.5 instead of 35.",
+    ],
+}
 
 
 def _item(names: tuple[str, ...], title: str) -> Item:
