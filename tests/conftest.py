@@ -14,6 +14,10 @@ from pathlib import Path
 
 import pytest
 
+# each worker computes with one core; threads that wait for work of linear algebra would take it
+for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
 #: more workers than this find nothing to do
 _MOST_WORKERS = 8
 #: files that take long, beside the tests of methods; they come next

@@ -38,6 +38,7 @@ _PIECES = 4
 _FIRST_OCTAVE = -20
 
 
+@lru_cache(maxsize=64)
 def _as_float(rate: Callable[..., Any]) -> Any:
     inner = user_piece(rate)
 
@@ -48,17 +49,18 @@ def _as_float(rate: Callable[..., Any]) -> Any:
     return value
 
 
-def _outcome(process: PairProcess) -> Any:
+@lru_cache(maxsize=64)
+def _outcome(kind: Any) -> Any:
     """Bind ``outcome(i, j, s, q)`` of one process, `q` being its own parameters."""
-    if type(process).random:
-        drawn = piece(type(process).outcome(rng.uniform))
+    if kind.random:
+        drawn = piece(kind.outcome(rng.uniform))
 
         @piece
         def random(i, j, s, q):
             return drawn(i, j, s.sizes, s.counts, s.rng, *q)
 
         return random
-    plain = piece(type(process).outcome)
+    plain = piece(kind.outcome)
 
     @piece
     def certain(i, j, s, q):
@@ -67,19 +69,20 @@ def _outcome(process: PairProcess) -> Any:
     return certain
 
 
-def _outcomes(processes: Sequence[PairProcess]) -> Any:
+@lru_cache(maxsize=64)
+def _outcomes(kinds: tuple[Any, ...]) -> Any:
     """Bind the outcomes into one function of the number of the process."""
 
-    def bound(processes: Sequence[PairProcess]) -> Any:
-        first = _outcome(processes[0])
-        if len(processes) == 1:
+    def bound(kinds: tuple[Any, ...]) -> Any:
+        first = _outcome(kinds[0])
+        if len(kinds) == 1:
 
             @piece
             def last(r, i, j, s, q):
                 return first(i, j, s, q[0])
 
             return last
-        others = bound(processes[1:])
+        others = bound(kinds[1:])
 
         @piece
         def one_of(r, i, j, s, q):
@@ -89,7 +92,7 @@ def _outcomes(processes: Sequence[PairProcess]) -> Any:
 
         return one_of
 
-    found = bound(processes)
+    found = bound(kinds)
 
     @piece
     def outcome(r, i, j, s, p, q):
@@ -98,24 +101,25 @@ def _outcomes(processes: Sequence[PairProcess]) -> Any:
     return outcome
 
 
-def _factors(processes: Sequence[Process]) -> Any:
+@lru_cache(maxsize=64)
+def _factors(rates: tuple[Callable[..., Any], ...]) -> Any:
     """Bind the factors into one; `q` holds a tuple of parameters for each; 0 without any."""
-    if not processes:
+    if not rates:
 
         @piece
         def none(r, t, q):
             return 0.0
 
         return none
-    first = user_piece(processes[0].factor.rate)
-    if len(processes) == 1:
+    first = user_piece(rates[0])
+    if len(rates) == 1:
 
         @piece
         def last(r, t, q):
             return float(first(t, *q[0]))
 
         return last
-    others = _factors(processes[1:])
+    others = _factors(rates[1:])
 
     @piece
     def factor(r, t, q):
@@ -124,6 +128,10 @@ def _factors(processes: Sequence[Process]) -> Any:
         return others(r - 1, t, q[1:])
 
     return factor
+
+
+def _rates(processes: Sequence[Process]) -> tuple[Callable[..., Any], ...]:
+    return tuple(process.factor.rate for process in processes)
 
 
 _loops: dict[tuple[Any, ...], Any] = {}
@@ -161,7 +169,8 @@ def loop_for(model: Model, method: Method, weighting: Weighting) -> Any:
 def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
     pairs, lone, sources = _kinds(model)
     own = len(model.kernel.parameters)
-    outcome, factor = _outcomes(pairs or [Aggregation()]), _factors(pairs or [Aggregation()])
+    present = pairs or [Aggregation()]
+    outcome, factor = _outcomes(tuple(map(type, present))), _factors(_rates(present))
     simulated, tally, weight = _as_float(model.kernel.rate), tally_one, None
     if weighting.weight is not None:
         weight = make_weight(weighting.weight, own)
@@ -179,7 +188,7 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
     shape = len(pairs), len(lone), len(sources)
     rate = beside.bind_rates(about)
     draw_lone = beside.make_lone(pieces.lone, rate, shape[0], shape[1])
-    choose = beside.make_choice(rate, _factors(lone), _factors(sources), *shape)
+    choose = beside.make_choice(rate, _factors(_rates(lone)), _factors(_rates(sources)), *shape)
     fire = beside.make_fire(
         pieces, outcome, factor, beside.bind_outcomes(about), choose, make_stands(weight),
         make_replacement(weight), shape[0], shape[1],

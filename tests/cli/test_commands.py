@@ -196,6 +196,7 @@ def test_the_solver_alone(folder):
     assert call("show", "s").stdout == result.stdout
 
 
+@pytest.mark.slow
 def test_a_case_with_units_has_results_with_units(folder):
     call("new", "air", "-t", "aerosol")
     call("run", "air.toml", "-s", "run.particles=500", "-s", "run.replicas=2")

@@ -127,6 +127,7 @@ def written(file: Path, before: int) -> int:
         return before
 
 
+@pytest.mark.slow
 def test_a_killed_run_starts_again_with_its_seed(tmp_path):
     (tmp_path / "c.toml").write_text(LONG.replace("seed = 11\n", ""))
     process = start("run", "c.toml", "-s", "run.particles=2e3", cwd=tmp_path)

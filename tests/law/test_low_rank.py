@@ -71,6 +71,7 @@ def test_wide_slots(law: str) -> None:
     laws.agreement([WIDE, sx.methods.LowRank(bits=6)], law)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shattering", [0.0, 0.1])
 def test_laws_that_bring_their_majorant(shattering: float) -> None:
     processes = [sx.processes.Aggregation(), sx.processes.Shattering(shattering)]

@@ -10,13 +10,15 @@ import smolux as sx
 from smolux.plan import Plan, make_plan
 
 METHODS = [method.name for method in sx.methods.METHODS]
+#: shared with the law tests
+FORMULA = "c0 + c1*(i + j) + c2*i*j + c3*(cbrt(i) + cbrt(j))**2*sqrt(1/i + 1/j)"
 #: a rate that varies in time, as formulas do it; shared with the law tests
 VARYING = "0.4 * (1 + sin(5 * t))"
 
 
 def model(rate: Any = 0.1, initial: Any = None, c0: float = 1.0, c1: float = 0.5) -> sx.Model:
     """Make a model whose loop the law tests compile too."""
-    kernel = sx.kernels.formula("c0 + c1*(i + j) + c2*i*j", c0=c0, c1=c1, c2=0.0)
+    kernel = sx.kernels.formula(FORMULA, c0=c0, c1=c1, c2=0.0, c3=0.0)
     processes = [sx.processes.Aggregation(), sx.processes.Shattering(rate)]
     return sx.Model(kernel, processes, initial or sx.initial.from_sizes({1: 0.8, 3: 0.2}))
 

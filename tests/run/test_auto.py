@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import runs
 
 import smolux as sx
 from smolux.assembly import rates_for
@@ -25,16 +26,21 @@ def test_a_constant_kernel_is_never_rejected() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kernel", "particles", "end"),
-    [(sx.kernels.Ballistic(), 20_000, 20.0), (sx.kernels.Additive(), 5_000, 1.0)],
+    ("law", "particles", "end"),
+    [("ballistic", 20_000, 20.0), ("additive", 5_000, 1.0)],
 )
-def test_the_estimate_is_near_what_a_run_needs(kernel: Any, particles: int, end: float) -> None:
+def test_the_estimate_is_near_what_a_run_needs(law: str, particles: int, end: float) -> None:
     from smolux.plan import make_plan
     from smolux.replicas import Group
 
+    given = {"c0": 0.0, "c1": 0.0, "c2": 0.0, "c3": 0.0}
+    kernel = sx.kernels.formula(
+        runs.FORMULA, **given | {"additive": {"c1": 1.0}, "ballistic": {"c3": 1.0}}[law]
+    )
+    processes = [sx.processes.Aggregation(), sx.processes.Shattering(0.0)]
     plan = make_plan(
-        sx.Model(kernel), [end], "acceptance-rejection", "number", "doubling", particles, 2, 1,
-        (0,), 16, 4, False,
+        sx.Model(kernel, processes), [end], "acceptance-rejection", "number", "doubling",
+        particles, 2, 1, (0,), 16, 4, False,
     )  # fmt: skip
     group = Group.start(plan, 0, 2)
     group.advance(lambda: False)

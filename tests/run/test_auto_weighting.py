@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import runs
 
 import smolux as sx
 from smolux import case as cases
@@ -19,7 +20,7 @@ from smolux.errors import InputError
 from smolux.plan import Plan, event_cost, make_plan
 
 METHOD = "acceptance-rejection"
-KERNEL = sx.kernels.formula("c0 + c1*(i + j) + c2*i*j", c0=1.0, c1=0.0, c2=0.0)
+KERNEL = sx.kernels.formula(runs.FORMULA, c0=1.0, c1=0.0, c2=0.0, c3=0.0)
 
 
 @pytest.fixture(autouse=True)

@@ -136,6 +136,7 @@ def test_bounds_that_do_not_hold_are_repaired(method: str, bounds: Any) -> None:
     assert abs(a - b) < 0.5 * (plain - b) + 1e-12
 
 
+@pytest.mark.slow
 def test_events_in_a_row_are_those_of_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
     """With repairs, shattering and doubling on the way, whole states are the same bit for bit."""
     method = sx.methods.AcceptanceRejection

@@ -23,7 +23,7 @@ GUIDES = [
     if "```python" in page.read_text(encoding="utf-8")
 ]
 #: these compile more loops than others
-LONG = ("efficiency", "many-cores", "units")
+LONG = ("choose-a-method", "efficiency", "many-cores", "units", "your-own-kernel")
 
 
 @pytest.fixture

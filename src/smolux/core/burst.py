@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from . import rng
@@ -67,17 +68,8 @@ class Burst(NamedTuple):
     release: Any
 
 
-def make_burst(brought: Burst, outcome: Callable[..., Any], pairs: int) -> Callable[..., Any]:
-    """Bind a burst to the outcomes of `pairs` processes, none of which draws random numbers.
-
-    Returns
-    -------
-    callable
-        ``burst(s, w, windows, p, q, until, stop)``: 0, with an event pending if one was found that
-        is not plain or comes after `until`, or the reason to return.
-    """
-    row, hold, find, replace, release = brought
-
+@lru_cache(maxsize=64)
+def _make_choose(pairs: int) -> Any:
     @piece
     def choose(windows, window, share):
         """Choose the process by a uniform number below the sum of rates; -1 if rounding has none.
@@ -91,6 +83,21 @@ def make_burst(brought: Burst, outcome: Callable[..., Any], pairs: int) -> Calla
             r += 1
             bound = windows.bounds[window, r]
         return r if share < bound else -1
+
+    return choose
+
+
+def make_burst(brought: Burst, outcome: Callable[..., Any], pairs: int) -> Callable[..., Any]:
+    """Bind a burst to the outcomes of `pairs` processes, none of which draws random numbers.
+
+    Returns
+    -------
+    callable
+        ``burst(s, w, windows, p, q, until, stop)``: 0, with an event pending if one was found that
+        is not plain or comes after `until`, or the reason to return.
+    """
+    row, hold, find, replace, release = brought
+    choose = _make_choose(pairs)
 
     @piece
     def burst(s, w, windows, p, q, until, stop):

@@ -4,6 +4,9 @@ A method brings nine `Pieces`, a model two; they are bound by closure and inline
 needs another one, or the rate, is made by a function that takes it: a compiled function passed as
 an argument could not be kept in the cache.
 
+What depends on nothing but other pieces is bound once and kept, here as in the methods: in the next
+loop of the process it need not be compiled again.
+
 The loop returns when every output time is recorded, when its budget is spent, or when it needs
 Python: a larger store, a bound of the kernel. The pending event is part of the state, so a
 trajectory depends neither on the output times nor on where the loop returned.
@@ -13,6 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from . import rng
@@ -77,6 +81,7 @@ def thinned(s, r, value, bound, share):
     return r if share < value else -1
 
 
+@lru_cache(maxsize=64)
 def make_choose_process(pairs: int) -> Callable[..., Any]:
     """Bind the choice of the process of an encounter, of the first `pairs` ones."""
 
@@ -193,6 +198,7 @@ def make_next_event(
     return next_event
 
 
+@lru_cache(maxsize=64)
 def make_fire(
     pair: Callable[..., Any],
     update: Callable[..., Any],

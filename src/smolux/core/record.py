@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 from .compile import cold_piece, piece
@@ -34,6 +35,7 @@ def tally_one(t, grid, size, count, p):
         t.sums[o] += count * x ** grid.orders[o]
 
 
+@lru_cache(maxsize=64)
 def make_record(visit: Callable[..., Any]) -> Callable[..., Any]:
     """Bind the recording of an observation."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -322,6 +323,7 @@ def _double(s, w):
     return True
 
 
+@lru_cache(maxsize=64)
 def _make_visit(tally: Any) -> Any:
     @cold_piece
     def visit(s, w, t, grid, p):

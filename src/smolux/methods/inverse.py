@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -138,6 +139,7 @@ def _double(s, w):
     return True
 
 
+@lru_cache(maxsize=64)
 def _make_visit(tally: Any) -> Any:
     @cold_piece
     def visit(s, w, t, grid, p):

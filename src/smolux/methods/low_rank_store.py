@@ -8,6 +8,7 @@ nothing depends on where they lie.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -248,6 +249,7 @@ def double(s, w):
     return True
 
 
+@lru_cache(maxsize=64)
 def make_visit(tally):
     """Bind the counting of all particles, for output."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -199,6 +200,7 @@ def double(s, w):
     return True
 
 
+@lru_cache(maxsize=64)
 def make_visit(tally):
     """Bind the counting of all particles, for output."""
 
