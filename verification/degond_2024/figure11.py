@@ -153,8 +153,8 @@ def present(data: dict[str, Any]) -> Outcome:
             "The paper finds the largest relative error in the rarefied case; here the largest "
             f"is {100 * largest:.1f} %, at φ = {phi:g} and N = {discs}.",
             "The number is that of one cluster which fills its box, between a fractal and a "
-            "plane; it grows with N and is no property of small clusters. For those see "
-            "[the large runs](large.md).",
+            "plane; it grows with N and is no property of small clusters. For those there "
+            "is the dimension by mass.",
         ],
         figure=_figure(data),
         caption="Left: dimension by boxes of the final cluster, event-driven, mean and standard "

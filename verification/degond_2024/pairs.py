@@ -148,9 +148,9 @@ def _table(data: dict[str, Any]) -> Table:
 def _figure(data: dict[str, Any]) -> Any:
     fractions, sizes = data["fractions"], data["sizes"]
     figure = new_figure("double", 0.6)
-    grid = figure.subplots(
-        2, len(fractions), sharex=True, sharey="row", height_ratios=(1.6, 1), squeeze=False
-    )
+    grid = figure.subplots(2, len(fractions), sharex=True, height_ratios=(1.6, 1), squeeze=False)
+    for ax in grid[1, 1:]:
+        ax.sharey(grid[1, 0])
     for column, fraction in enumerate(fractions):
         top, bottom = grid[:, column]
         for k, n in enumerate(sizes):
@@ -180,7 +180,8 @@ def _figure(data: dict[str, Any]) -> Any:
             use_linear(ax, "x")
             use_linear(ax, "y")
     grid[0, 0].set_ylabel("pair distribution $g$")
-    grid[0, 0].set_ylim(bottom=0)
+    for ax in grid[0]:
+        ax.set_ylim(bottom=0)
     grid[1, 0].set_ylabel(f"time steps / events,\n$N = {sizes[-1]}$")
     handles = [Line2D([], [], color=PALETTE[k], label=f"$N = {n}$") for k, n in enumerate(sizes)]
     handles += [
