@@ -1,6 +1,7 @@
 """Discs in a box to one cluster: processor seconds of the methods, exponents, memory.
 
-``python benchmarks/spatial.py`` goes to 10^5 discs; with ``large`` to 10^6, in some minutes.
+``python benchmarks/spatial.py`` goes to 10^5 discs; with ``large`` to 10^6, in some minutes; with
+``memory`` it measures the memory of 10^5 to 10^7 discs alone, down to a tenth of the clusters.
 """
 
 from __future__ import annotations
@@ -99,12 +100,29 @@ def references() -> list[str]:
 
 def memory(discs: int) -> list[str]:
     """Peak of the resident memory over what Python and the compiled code take."""
-    root = round(discs**0.5)
+    side, each, _ = measured_peak(discs)
+    return [f"Memory of a run of {side**2:,} discs, its system included: {each:.0f} bytes a disc."]
+
+
+def measured_peak(discs: int) -> tuple[int, float, float]:
+    """Side of the lattice, bytes a disc and processor seconds, of a process of its own."""
+    side = round(discs**0.5)
     out = subprocess.run(
-        [sys.executable, __file__, "peak", str(root)], capture_output=True, text=True, check=True
+        [sys.executable, __file__, "peak", str(side)], capture_output=True, text=True, check=True
     )
-    each = float(out.stdout)
-    return [f"Memory of a run of {root**2:,} discs, its system included: {each:.0f} bytes a disc."]
+    each, cost = map(float, out.stdout.split())
+    return side, each, cost
+
+
+def memories() -> list[str]:
+    """Table of the memory by the number of discs."""
+    rows = []
+    for discs in (100_000, 1_000_000, 10_000_000):
+        side, each, cost = measured_peak(discs)
+        rows.append([f"{side**2:,}", f"{each:.0f}", f"{each * side**2 / 2**30:.2f} GiB",
+                     f"{cost:.3g} s", "400"])  # fmt: skip
+        print(*rows[-1], flush=True)
+    return table(["discs", "bytes a disc", "in all", "processor time", "asked for"], rows)
 
 
 def highest() -> int:
@@ -114,19 +132,27 @@ def highest() -> int:
 
 
 def peak(side: int) -> None:
-    """Print bytes a disc; runs in a process of its own."""
+    """Print bytes a disc and processor seconds; runs in a process of its own."""
     seconds(sp.Windowed, sp.lattice(400, 0.1, seed=1))
     before = highest()
     system = sp.lattice(side**2, 0.1, seed=1)
+    start = time.process_time()
     run = sp.Windowed().start(system, np.empty(0))
     while run.clusters > side**2 // 10 and run.advance(np.inf, 1, 1 << 16) is None:
         pass
-    print((highest() - before) / side**2)
+    print((highest() - before) / side**2, time.process_time() - start)
 
 
 def main() -> None:
     if sys.argv[1:2] == ["peak"]:
         peak(int(sys.argv[2]))
+        return
+    if sys.argv[1:2] == ["memory"]:
+        lines = [
+            "2D, volume fraction 0.1, the system included, down to a tenth of the clusters.",
+            "",
+        ]
+        write_section("spatial-memory", "Memory of discs in a box", [*lines, *memories()])
         return
     large = "large" in sys.argv[1:]
     lines = [
