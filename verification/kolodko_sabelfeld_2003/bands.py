@@ -234,7 +234,7 @@ _NOTES = {
     ],
     "additive": [
         "The text says that the bias of MFA and WA is about 100 times smaller than that of MMF. So "
-        "small a one is not resolved by these replicas; for u₅₅₂(5) that of MFA is about a tenth.",
+        "small a one is not resolved by these replicas.",
         "Sizes up to 552 hold 95 % of the mass at t = 5; the paper does not say where its figure "
         "ends.",
     ],

@@ -164,9 +164,10 @@ def _figure(name: str, data: dict[str, Any]) -> Any:
 
 def present(name: str, data: dict[str, Any]) -> Outcome:
     table = target(name)
+    kernel = KERNEL_NAME[table["kernel"]].capitalize()
     return Outcome(
-        ran=f"{KERNEL_NAME[table['kernel']]} to t = {table['time']:g}, the algorithms and N of the "
-        "paper; the median of three ensembles of each.".capitalize(),
+        ran=f"{kernel} to t = {table['time']:g}, the algorithms and N of the paper; the median of "
+        "three ensembles of each.",
         checks=_checks(name, data),
         tables=[_table(name, data), _events(data)],
         notes=_NOTES,
