@@ -150,7 +150,8 @@ def _figure(data: dict[str, Any]) -> Any:
                 middle = np.exp(np.log(s[fit]).mean() - slope * np.log(n[fit]).mean())
                 ax.plot(n[fit], middle * n[fit] ** slope, color=PALETTE[k], lw=0.8)
                 ax.annotate(
-                    f"{slope:.2f}", (n[-1], s[-1]), xytext=(5, _SHIFT.get(name, 0)), textcoords="offset points",
+                    f"{slope:.2f}", (n[-1], s[-1]), textcoords="offset points",
+                    xytext=(5, _SHIFT.get(name, 0)),
                     color=PALETTE[k], fontsize=7, va="center",
                 )  # fmt: skip
         ax.set_title(rf"$\phi = {fraction}$", pad=3)
