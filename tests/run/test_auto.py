@@ -72,7 +72,7 @@ def test_kernels_far_below_their_bound_are_not_left_to_rejection() -> None:
 @pytest.mark.parametrize(
     ("kernel", "particles", "method"),
     [
-        (sx.kernels.Additive(), 5_000, "low-rank"),
+        (sx.kernels.Additive(), 1_000, "low-rank"),
         (sx.kernels.Additive(), 50_000, "size-class"),
         (sx.kernels.Brownian(), 5_000, "acceptance-rejection"),  # two products
         (sx.kernels.Constant(), 5_000, "acceptance-rejection"),  # one, but nothing is rejected

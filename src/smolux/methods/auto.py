@@ -26,13 +26,14 @@ _CHANGE, _FIRST, _RAMP, _STEPS = 0.04, 1e-4, 1.4, 300
 _STEADY = 1e-3
 #: quantiles that stand for the sizes at the start
 _SHARES = (np.arange(64) + 0.5) / 64
-#: nanoseconds: a candidate of acceptance-rejection, and what an event costs besides; the same of
-#: the size-class method, whose tables of pairs cost more for few particles
-_TRIAL, _EVENT = 27.0, 35.0
-_CLASS_EVENT, _CLASS_FEW = 68.0, 2.2e5
-#: the low-rank method, for a kernel that is one product of factors, or the sum of such a product
+#: nanoseconds: a candidate of acceptance-rejection; what an event costs besides, for many
+#: particles, and what is shared by the events of few: bounds and tables
+_TRIAL, _EVENT, _FEW = 18.0, 10.0, 1.6e5
+#: the same of the size-class method, for which nearly every candidate is an event
+_CLASS_EVENT, _CLASS_FEW = 34.0, 2.5e5
+#: of the low-rank method, for a kernel that is one product of factors, or the sum of such a product
 #: and its transpose; with more products it is never the best
-_ONE_PRODUCT = 83.0
+_PRODUCT_EVENT, _PRODUCT_FEW = 83.0, 1.9e5
 
 
 @dataclass(frozen=True)
@@ -221,12 +222,12 @@ def costs(
     """
     candidates = candidates_per_event(rates, processes, particles, density, sizes, end)
     found: dict[type[Method], float] = {
-        AcceptanceRejection: _EVENT + _TRIAL * candidates,
+        AcceptanceRejection: _EVENT + _FEW / particles + _TRIAL * candidates,
         SizeClass: _CLASS_EVENT + _CLASS_FEW / particles,
     }
     known = rates.majorant
     if known is not None and len(known.terms) == 1 and known.least == 1.0:
-        found[LowRank] = _ONE_PRODUCT
+        found[LowRank] = _PRODUCT_EVENT + _PRODUCT_FEW / particles
     return found, candidates
 
 
