@@ -49,6 +49,7 @@ def points(folder: Path) -> dict[str, int]:
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="signals of POSIX")
+@pytest.mark.slow
 def test_killed_in_the_middle_and_gone_on_with(folder):
     command = [sys.executable, "-m", "smolux", "sweep", "c.toml", *OVER, "-o", "cut"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
