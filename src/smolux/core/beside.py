@@ -21,7 +21,7 @@ import numpy as np
 
 from . import rng
 from .compile import cold_piece, piece, user_piece
-from .loop import ROUNDING, make_choose_process, note_bad, schedule, thinned
+from .loop import PATIENCE, ROUNDING, make_choose_process, note_bad, schedule, thinned
 from .slots import slot_of
 from .state import (
     BAD_FACTOR,
@@ -57,8 +57,6 @@ from .state import (
 
 #: classes an octave in which the rates of single particles are bounded, as a power of two
 CEILING_BITS = 3
-#: candidates looked at before the loop may return without an event
-_PATIENCE = 4096
 
 PAIR, ALONE, SOURCE = 0, 1, 2
 
@@ -185,7 +183,7 @@ def make_lone(lone: Callable[..., Any], rate: Callable[..., Any], pairs: int, co
         if most <= 0.0:
             return math.inf
         wait = 0.0
-        for _ in range(_PATIENCE):
+        for _ in range(PATIENCE):
             s.count[TRIALS] += 1
             wait += rng.exponential(s.rng)
             one, size = lone(s, w, rng.below(s.rng, n))

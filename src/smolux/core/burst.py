@@ -68,6 +68,21 @@ class Burst(NamedTuple):
     release: Any
 
 
+def make_draw_one(find: Callable[..., Any]) -> Callable[..., Any]:
+    """Bind the drawing of one event by `Burst.find`, for `Pieces.draw`."""
+
+    @piece
+    def draw_one(s, w, p, factor, held):
+        a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
+        wait, s.count[FIRST], s.count[SECOND], _, _, s.count[TRIALS], a, b, c, d = find(
+            s, w, p, factor, held, s.count[PARTICLES], s.count[TRIALS], a, b, c, d
+        )
+        s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
+        return wait
+
+    return draw_one
+
+
 @lru_cache(maxsize=64)
 def _make_choose(pairs: int) -> Any:
     @piece

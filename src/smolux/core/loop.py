@@ -64,6 +64,8 @@ from .state import (
     Tally,
 )
 
+#: candidates looked at before the loop may return without an event
+PATIENCE = 4096
 #: what a value may be above its bound by rounding
 ROUNDING = 1.0 + 1e-12
 

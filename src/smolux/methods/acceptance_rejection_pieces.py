@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core import rng
-from ..core.burst import NOT_PLAIN, PLAIN, Burst
+from ..core.burst import NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
 from ..core.levels import renew_majorant
-from ..core.loop import Pieces, note_bad, note_largest, repair
+from ..core.loop import PATIENCE, Pieces, note_bad, note_largest, repair
 from ..core.prefetch import prefetch
 from ..core.state import (
     FIRST,
@@ -25,13 +25,10 @@ from ..core.state import (
     SINCE,
     SMALLEST,
     STORED,
-    TRIALS,
     VALUE,
     VOLUME,
 )
 
-#: candidates looked at before the loop may return without an event
-_PATIENCE = 4096
 #: candidates whose pairs are drawn ahead, so that their memory is there when it is needed
 AHEAD = 8
 _ONE = at(1)
@@ -125,7 +122,7 @@ def _make_find(rate: Any) -> Any:
         """See `smolux.core.burst.Burst`; NaN for a rate that is none, which has been noted."""
         majorant, monomers = s.clock[MAJORANT], held.monomers
         unit = 2.0 * s.clock[VOLUME] / (float(n) * float(n - 1) * majorant * factor)
-        waited, last = 0.0, trials + _PATIENCE
+        waited, last = 0.0, trials + PATIENCE
         while trials < last:
             k = at(2 * (trials & (AHEAD - 1)))
             trials += 1
@@ -156,24 +153,19 @@ def _make_find(rate: Any) -> Any:
 
 
 def _make_draw(find: Any) -> Any:
+    draw_one = make_draw_one(find)
+
     @piece
     def draw(s, w, p, factor):
-        n = s.count[PARTICLES]
         s.count[FIRST] = -1
-        if n < 2:
+        if s.count[PARTICLES] < 2:
             return math.inf
         if s.clock[MAJORANT] <= 0.0:
             return math.inf if s.clock[VALUE] == 0.0 else math.nan
         if w.ahead[0] < 0.0:
             for k in range(2 * AHEAD):
                 w.ahead[k] = rng.uniform(s.rng)
-        a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
-        wait, first, second, _, _, s.count[TRIALS], a, b, c, d = find(
-            s, w, p, factor, _hold(s, w), n, s.count[TRIALS], a, b, c, d
-        )
-        s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
-        s.count[FIRST], s.count[SECOND] = first, second
-        return wait
+        return draw_one(s, w, p, factor, _hold(s, w))
 
     return draw
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core import rng
 from ..core.compile import cold_piece, piece
-from ..core.loop import note_bad, repair
+from ..core.loop import PATIENCE, note_bad, repair
 from ..core.prefetch import prefetch
 from ..core.segment_tree import add, build, find, find_mixed
 from ..core.slots import octave
@@ -29,8 +29,6 @@ from .low_rank_store import (
     slot_for,
 )
 
-#: candidates looked at before the loop may return without an event
-_PATIENCE = 4096
 #: a particle is a number of this many bits within its slot, and the slot above them
 _PLACE_BITS = 44
 #: a rate above its majorant by no more than rounding breaks no bound
@@ -192,7 +190,7 @@ def make_draw(rate: Any) -> Any:
         # a majorant that was found broken is raised as a whole
         raised = max(1.0, s.clock[FLOOR])
         wait = 0.0
-        for _ in range(_PATIENCE):
+        for _ in range(PATIENCE):
             s.count[TRIALS] += 1
             wait += rng.exponential(s.rng)
             if w.rank[stage, 2] == 0:

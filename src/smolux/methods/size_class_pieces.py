@@ -9,11 +9,11 @@ import numpy as np
 
 from ..core import rng
 from ..core.alias import outcome
-from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst
+from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
-from ..core.loop import Pieces, note_bad, repair
+from ..core.loop import PATIENCE, Pieces, note_bad, repair
 from ..core.prefetch import prefetch
-from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, TRIALS, VOLUME
+from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, VOLUME
 from .size_class_store import (
     AHEAD,
     BLOCK,
@@ -32,8 +32,6 @@ from .size_class_store import (
 )
 from .size_class_table import prepare
 
-#: candidates looked at before the loop may return without an event
-_PATIENCE = 4096
 #: a chosen particle is a number of this many bits within its class, and the class above them
 _SLOT_BITS = 44
 _SLOT = (1 << _SLOT_BITS) - 1
@@ -106,7 +104,7 @@ def _make_find(rate: Any) -> Any:
     def find(s, w, p, factor, held, n, trials, c0, c1, c2, c3):
         """See `smolux.core.burst.Burst`; NaN for a rate that is none, which has been noted."""
         unit = s.clock[VOLUME] / (s.clock[MAJORANT] * factor)
-        waited, last = 0.0, trials + _PATIENCE
+        waited, last = 0.0, trials + PATIENCE
         while trials < last:
             if w.meta[NEXT] == AHEAD:
                 s.rng[0], s.rng[1], s.rng[2], s.rng[3] = c0, c1, c2, c3
@@ -134,19 +132,14 @@ def _make_find(rate: Any) -> Any:
 
 
 def _make_draw(find: Any) -> Any:
+    draw_one = make_draw_one(find)
+
     @piece
     def draw(s, w, p, factor):
-        n = s.count[PARTICLES]
         s.count[FIRST] = -1
-        if n < 2 or s.clock[MAJORANT] <= 0.0:
+        if s.count[PARTICLES] < 2 or s.clock[MAJORANT] <= 0.0:
             return math.inf
-        a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
-        wait, first, second, _, _, s.count[TRIALS], a, b, c, d = find(
-            s, w, p, factor, (), n, s.count[TRIALS], a, b, c, d
-        )
-        s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
-        s.count[FIRST], s.count[SECOND] = first, second
-        return wait
+        return draw_one(s, w, p, factor, _hold(s, w))
 
     return draw
 
