@@ -68,6 +68,10 @@ class Group:
     distribution: list[list[tuple[Int, Int]]] = field(default_factory=list)
     seconds: float = 0.0
     compile_seconds: float = 0.0
+    #: what `loop_for` returns for the plan, once it is known: what tells loops apart takes time
+    loop: Any = None
+    #: candidates and events of a slice
+    budget: int = 10_000
 
     @classmethod
     def start(cls, plan: Plan, first: int, count: int) -> Group:
@@ -124,12 +128,10 @@ class Group:
         self._call(np.full(len(self.codes), DONE, np.int64), 0)
         self.compile_seconds = time.perf_counter() - start
 
-    def _loop(self) -> Any:
-        return loop_for(self.plan.model, self.plan.method, self.plan.weighting)
-
-    def _call(self, codes: Int, budget: int, loop: Any = None) -> None:
+    def _call(self, codes: Int, budget: int) -> None:
         plan = self.plan
-        (loop or self._loop())(
+        self.loop = self.loop or loop_for(plan.model, plan.method, plan.weighting)
+        self.loop(
             self.state,
             self.work,
             self.tally,
@@ -141,24 +143,22 @@ class Group:
             budget,
         )
 
-    def advance(self, stop: Callable[[], bool], loop: Any = None) -> None:
+    def advance(self, stop: Callable[[], bool]) -> None:
         """Go on until done or until `stop` says so, asked about ten times a second.
 
         Every call gets something done, so that a run interrupted again and again comes to its end.
-        `loop` is what `loop_for` returns for the plan, if it is known already.
         """
-        budget = 10_000
-        loop = loop or self._loop()  # found once: what tells loops apart takes time
         while not self.done:
-            before = self._effort()
+            before, budget = self._effort(), self.budget
             start = time.perf_counter()
-            self._call(self.codes, budget, loop)
+            self._call(self.codes, budget)
             elapsed = time.perf_counter() - start
             self.seconds += elapsed
             self._serve()
             spent = self._effort() - before
             if spent > 0.5 * budget:
-                budget = int(min(max(spent * _SLICE / max(elapsed, 1e-6), 1000), 1e10, 20 * budget))
+                wanted = max(spent * _SLICE / max(elapsed, 1e-6), 1000)
+                self.budget = int(min(wanted, 1e10, 20 * budget))
             if stop():
                 return
 

@@ -149,6 +149,7 @@ class Divided:
         method, rates = plan.method, rates_for(plan.model, plan.weighting)
         learnt = method.learnt(self.parts[0].work, self.parts[0].state)
         window = int(np.searchsorted(self.windows.edges, start, side="right")) - 1
+        loop = self.parts[0].loop
 
         def split(k: int) -> list[Any]:
             part, words = self.parts[k], stream(plan.entropy, self.first, _MIXING, self.stretch, k)
@@ -163,7 +164,9 @@ class Divided:
             state.clock[0, RAISED:] = clock[RAISED:]
             state.count[0, WINDOW] = window
             method.use(work, state, learnt)
-            return Group.of(plan, self.first, state, work, self.windows)
+            group = Group.of(plan, self.first, state, work, self.windows)
+            group.loop = loop
+            return group
 
         piles = list(pool.map(split, range(len(self.parts))))
         self.parts.clear()  # room for what follows

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.assembly import loop_for, rates_for, windows_for
+from smolux.assembly import rates_for, windows_for
 from smolux.checks import whole
 from smolux.core.rng import streams
 from smolux.core.state import BUDGET, DONE, State
@@ -78,11 +78,11 @@ class Sampler:
         self.plan = plan
         self.goals = [_goal(name, plan.orders, plan.sizes, []) for name in observables]
         self._looks = [replace(plan, goal=goal) for goal in self.goals]
-        self._loop = loop_for(plan.model, plan.method, plan.weighting)
         self._windows = windows_for(plan.model.processes, plan.times[-1], plan.weighting)
         first = Group.start(plan, 0, 1)
         first.compile()
         first.advance(lambda: False)
+        self._loop = first.loop
         self._state: State | None = None
         self._work: Any = None
         self._tables: set[str] = set()
@@ -114,10 +114,13 @@ class Sampler:
         """Start the replicas ``first .. first + count - 1``."""
         plan = self.plan
         if self._state is None or count != plan.replicas:
-            return Group.start(plan, first, count)
-        rng = streams(plan.entropy, first, count)
-        state = State(rng, *(array.copy() for array in self._state[1:]))
-        return Group.of(plan, first, state, self._fresh(), self._windows)
+            group = Group.start(plan, first, count)
+        else:
+            rng = streams(plan.entropy, first, count)
+            state = State(rng, *(array.copy() for array in self._state[1:]))
+            group = Group.of(plan, first, state, self._fresh(), self._windows)
+        group.loop = self._loop
+        return group
 
     def _fresh(self) -> Any:
         """Return the stores at the start: each thread has its own, and its tables fill up."""
@@ -133,9 +136,9 @@ class Sampler:
         """Run a group and return the observables, of shape (replicas, observables, times)."""
         # one runs ahead, so that the others find the bounds that all of them need
         group.codes[1:] = DONE
-        group.advance(stop, self._loop)
+        group.advance(stop)
         group.codes[1:] = BUDGET
-        group.advance(stop, self._loop)
+        group.advance(stop)
         return np.stack([observable(look, [group])[0] for look in self._looks], axis=1)
 
     def batch(self, first: int, count: int, stop: Callable[[], bool]) -> Batch:
