@@ -19,6 +19,8 @@ from .trace import Trace
 Float = NDArray[np.float64]
 
 _ROOM = 1 << 16
+#: bytes of a cache line, and how many of a row are given away to fill its last one
+_LINE, _SPARE = 64, 8
 #: the skin at the start in mean distances of discs; its least, in diameters: then room is made
 _SKIN, _THIN = 0.6, 1e-3
 #: room for pairs and for events at the start, by disc
@@ -35,9 +37,15 @@ def _loop(dimension: int) -> Callable[..., Any]:
 
 
 def _rows(count: int, **columns: tuple[str, int]) -> NDArray[Any]:
-    """Return a table of rows, all columns of one beside each other."""
+    """Return a table of rows, all columns of one beside each other; rows begin with cache lines."""
     kinds = [(name, kind, (width,)) for name, (kind, width) in columns.items()]
-    return np.zeros(count, np.dtype(kinds, align=True))
+    row = np.dtype(kinds, align=True)
+    spare = -row.itemsize % _LINE
+    if spare <= _SPARE:  # longer rows, but none lies in one cache line more than it needs
+        row = np.dtype([*kinds, ("spare", "u1", (spare,))], align=True)
+    memory = np.zeros(count * row.itemsize + _LINE, np.uint8)
+    start = -memory.ctypes.data % _LINE
+    return memory[start : start + count * row.itemsize].view(row)
 
 
 @dataclass
@@ -177,9 +185,10 @@ class WindowedRun(Run):
             body=cluster["body"],
             bound=cluster["bound"],
             group=cluster["group"],
-            half_edge=np.zeros((2 * pairs, flight.EDGE_COLUMNS), np.int32),
+            half_edge=_rows(2 * pairs, edge=("i4", flight.EDGE_COLUMNS))["edge"],
             when=event["when"][:, 0],
             event=event["event"],
+            lot=np.zeros((flight.LOT, flight.LOT_COLUMNS), np.int64),
         )
 
     def _gridded(self, f: Any) -> Any:

@@ -46,10 +46,16 @@ COUNTS = 18
 
 # Columns of Flight.body after displacement and velocity, which take 2 d.
 SINCE = 0  # time of the displacement
-MASS = 1  # 0: merged into another one
-WAY = 2  # moved since it was listed
-HORIZON = 3  # until when contacts are predicted
+HORIZON = 1  # until when contacts are predicted
+MASS = 2  # 0: merged into another one
+WAY = 3  # moved since it was listed
 BODY = 4
+
+#: pairs whose discs, blocks and clusters are fetched together
+LOT = 32
+# Columns of Flight.lot: half-edge, block of each end, cluster of each end.
+HALF, NEAR_BLOCK, FAR_BLOCK, NEAR_CLUSTER, FAR_CLUSTER = 0, 1, 2, 3, 4
+LOT_COLUMNS = 5
 
 # Values of count[FULL].
 PAIR, EVENT = 1, 2
@@ -106,6 +112,8 @@ class Flight(NamedTuple):
     half_edge : of shape (2 P, 4)
     when, event : of shape (E,), (E, 2)
         The heap.
+    lot : of shape (LOT, 5)
+        Work space.
     """
 
     clock: np.ndarray
@@ -127,3 +135,4 @@ class Flight(NamedTuple):
     half_edge: np.ndarray
     when: np.ndarray
     event: np.ndarray
+    lot: np.ndarray

@@ -19,6 +19,9 @@ from .flight import (
     VERSION,
 )
 
+#: before a half-edge that is in no list
+GONE = -2
+
 
 @piece
 def cluster_of(f, i):
@@ -84,6 +87,24 @@ def remove(f, p, a, b):
     f.half_edge[2 * p, AFTER] = count[FREE]
     count[FREE] = p
     count[PAIRS] -= 1
+
+
+@piece
+def drop(f, h, c):
+    """Take a half-edge of a pair inside a cluster out of its list; strike it off with the other.
+
+    The one that goes first is marked, and keeps its place behind the walk through the list.
+    """
+    half_edge, count = f.half_edge, f.count
+    p = h >> 1
+    unlink(f, h, c)
+    half_edge[2 * p, VERSION] += 1
+    if half_edge[h ^ 1, BEFORE] != GONE:
+        half_edge[h, BEFORE] = GONE
+    else:
+        half_edge[2 * p, AFTER] = count[FREE]
+        count[FREE] = p
+        count[PAIRS] -= 1
 
 
 @piece

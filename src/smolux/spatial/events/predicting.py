@@ -14,19 +14,26 @@ from .flight import (
     CLUSTER,
     DISC,
     EDGE,
+    FAR_BLOCK,
+    FAR_CLUSTER,
+    HALF,
     HORIZON,
     LISTED_IN,
+    LOT,
     MASS,
+    NEAR_BLOCK,
+    NEAR_CLUSTER,
     PREDICTED,
     SINCE,
     SPREAD,
     STAMP,
+    USED,
     VERSION,
     WAY,
 )
 from .geometry import contact_time, shift, smaller, wall_time
 from .heap import push
-from .pairs import cluster_of, remove
+from .pairs import drop
 
 
 def bind(d):
@@ -108,32 +115,51 @@ def bind(d):
                 body[c, horizon] = end
             c += 1
 
-    @cold_piece
-    def predict_all(f, c, stop, batch, every, t):
-        """Predict all contacts of clusters; pairs inside them are struck off.
+    @piece
+    def fetch(f, lot, count):
+        """Find blocks and clusters of pairs, in passes: none waits for the memory of another."""
+        half_edge, disc, block = f.half_edge, f.disc, f.block
+        for k in range(count):
+            h = lot[k, HALF]
+            lot[k, NEAR_BLOCK] = disc[half_edge[h, DISC], BLOCK]
+            lot[k, FAR_BLOCK] = disc[half_edge[h ^ 1, DISC], BLOCK]
+        for k in range(count):
+            lot[k, NEAR_CLUSTER] = block[lot[k, NEAR_BLOCK], CLUSTER]
+            lot[k, FAR_CLUSTER] = block[lot[k, FAR_BLOCK], CLUSTER]
 
-        Of clusters as in `look_ahead`. If these are `every` cluster, each pair is met twice, and
-        predicted once.
-        """
-        group, half_edge = f.group, f.half_edge
+    @cold_piece
+    def predict_listed(f, t):
+        """Predict all contacts after everything was listed anew."""
+        lot, p = f.lot, np.int64(0)
+        while p < f.count[USED]:
+            count = smaller(f.count[USED] - p, LOT)
+            for k in range(count):
+                lot[k, HALF] = 2 * (p + k)
+            fetch(f, lot, count)
+            for k in range(count):
+                predict(f, p + k, t)
+            p += count
+
+    @cold_piece
+    def predict_all(f, c, stop, batch, t):
+        """Predict all contacts of clusters, as in `look_ahead`; strike off pairs inside them."""
+        group, half_edge, lot = f.group, f.half_edge, f.lot
         while c < stop:
             h = np.int64(-1)
             if batch == 0 or group[c, LISTED_IN] == batch:
                 h = np.int64(group[c, EDGE])
             while h >= 0:
-                p, after = h >> 1, np.int64(half_edge[h, AFTER])
-                if every > 0:
-                    if h & 1 == 0:
-                        predict(f, p, t)
-                elif cluster_of(f, half_edge[2 * p, DISC]) == cluster_of(
-                    f, half_edge[2 * p + 1, DISC]
-                ):
-                    if after == h ^ 1:
-                        after = np.int64(half_edge[after, AFTER])
-                    remove(f, p, np.int32(c), np.int32(c))
-                else:
-                    predict(f, p, t)
-                h = after
+                count = 0
+                while h >= 0 and count < LOT:
+                    lot[count, HALF] = h
+                    h = np.int64(half_edge[h, AFTER])
+                    count += 1
+                fetch(f, lot, count)
+                for k in range(count):
+                    if lot[k, NEAR_CLUSTER] == lot[k, FAR_CLUSTER]:
+                        drop(f, lot[k, HALF], np.int32(c))
+                    else:
+                        predict(f, lot[k, HALF] >> 1, t)
             c += 1
 
-    return speed, next_wall, look_ahead, predict_all
+    return speed, next_wall, look_ahead, predict_listed, predict_all

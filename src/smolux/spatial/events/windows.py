@@ -85,7 +85,7 @@ LIST_COST, CHECK_COST, PREDICT_COST = 1.3, 1.0, 12.0
 def bind(d):
     """Bind the loop for `d` dimensions."""
     bring, empty, list_blocks, rebin_chain = listing.bind(d)
-    speed, next_wall, look_ahead, predict_all = predicting.bind(d)
+    speed, next_wall, look_ahead, predict_listed, predict_all = predicting.bind(d)
     since, mass, way = 2 * d + SINCE, 2 * d + MASS, 2 * d + WAY
 
     @piece
@@ -93,7 +93,7 @@ def bind(d):
         """Predict all that concerns a cluster."""
         none = np.int64(0)
         look_ahead(f, c, c + 1, none)
-        predict_all(f, c, c + 1, none, none, t)
+        predict_all(f, c, c + 1, none, t)
 
     @cold_piece
     def strike(f, c):
@@ -108,7 +108,7 @@ def bind(d):
         f.count[REBUILT] += 1
         list_blocks(f, none, none, np.int64(f.place.shape[0]), t, none, work, near)
         look_ahead(f, none, all_, none)
-        predict_all(f, none, all_, none, np.int64(1), t)
+        predict_listed(f, t)
 
     @piece
     def relist_due(f, work, near):
@@ -124,7 +124,7 @@ def bind(d):
                 rebin_chain(f, np.int64(group[c, START]), none, t)
         list_blocks(f, all_, none, none, t, batch + 1, work, near)
         look_ahead(f, np.int64(0), all_, batch + 1)
-        predict_all(f, np.int64(0), all_, batch + 1, np.int64(0), t)
+        predict_all(f, np.int64(0), all_, batch + 1, t)
 
     @piece
     def fastest(f):
