@@ -21,8 +21,8 @@ Float = NDArray[np.float64]
 _ROOM = 1 << 16
 #: bytes of a cache line, and how many of a row are given away to fill its last one
 _LINE, _SPARE = 64, 8
-#: the skin at the start in mean distances of discs; its least, in diameters: then room is made
-_SKIN, _THIN = 0.6, 1e-3
+#: pairs by disc that the skin at the start is to list; its least, in diameters: then room is made
+_LISTED, _THIN = 1.25, 1e-3
 #: room for pairs and for events at the start, by disc
 _PAIRS, _EVENTS = 1.75, 1.75
 #: discs of one cluster share a block from this mean size on
@@ -46,6 +46,15 @@ def _rows(count: int, **columns: tuple[str, int]) -> NDArray[Any]:
     memory = np.zeros(count * row.itemsize + _LINE, np.uint8)
     start = -memory.ctypes.data % _LINE
     return memory[start : start + count * row.itemsize].view(row)
+
+
+def _first_skin(system: System) -> float:
+    """Return a skin within which discs at random have so many others as there is room for."""
+    d = system.dimension
+    unit = np.pi * (1 if d == 2 else 4 / 3)
+    inner = float(((2 * system.radius) ** d).mean())
+    room = 2 * _LISTED * system.box.volume / (len(system) * unit)
+    return float((inner + room) ** (1 / d) - inner ** (1 / d))
 
 
 @dataclass
@@ -104,8 +113,7 @@ class WindowedRun(Run):
         self.clock[flight.SCALE] = float(np.sqrt((system.velocity**2).sum(1).max()))
         self.clock[flight.WIDEST], self.clock[flight.LONGEST] = widest, max(box.lengths)
         self.clock[flight.THICKEST] = thickest
-        spacing = (box.volume / n) ** (1 / d)
-        self.clock[flight.SKIN] = min(settings.skin or _SKIN * spacing, thickest)
+        self.clock[flight.SKIN] = min(settings.skin or _first_skin(system), thickest)
         room = system.radius if system.wall_contact == "surface" else np.zeros(n)
         everyone = np.arange(n, dtype=np.int32)
         state = _State(
@@ -308,7 +316,7 @@ class Windowed(SpatialMethod):
         The run ends when there was no merge while the fastest cluster would have crossed the box
         so many times.
     skin : float, optional
-        Skin at the start; 0.6 times the mean distance of the discs if left out.
+        Skin at the start; if left out, such that a disc has 2.5 others within it.
     """
 
     patience: float = 1e4

@@ -77,6 +77,9 @@ NAME, BLOCK = 0, 1
 FIRST, CLUSTER, CHAIN, CELL, NEXT = 0, 1, 2, 3, 4
 BLOCK_COLUMNS = 5
 
+# A bit of Flight.head.
+MIXED = np.int32(1 << 30)
+
 # Columns of Flight.group: first and last block, number of blocks and of discs, first and last
 # half-edge, number of the latest state, and of the listing: 2 n to be listed in batch n, 2 n + 1 if
 # that is done.
@@ -106,7 +109,7 @@ class Flight(NamedTuple):
     block, place, half : of shape (B + 1, 5), (B, d), (B, d)
         Blocks; half the extension of their centres.
     head : of shape (C,)
-        First block of each cell.
+        First block of each cell; with the bit MIXED, if there may be other clusters than its own.
     body, bound, group : of shape (G, 2 d + 4), (G, 2 d), (G, 8)
         Clusters; their lower and upper bounds, less the displacement.
     half_edge : of shape (2 P, 4)

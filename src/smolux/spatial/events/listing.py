@@ -19,11 +19,13 @@ from .flight import (
     EDGE,
     FIRST,
     FREE,
+    FULL,
     HEAP,
     LAST_EDGE,
     LISTED,
     LISTED_IN,
     MASS,
+    MIXED,
     NEXT,
     PAIRS,
     SINCE,
@@ -45,7 +47,7 @@ def bind(d):
     def centre(f, b, k, t):
         """Component of the centre of a block at a time."""
         body = f.body
-        c = f.block[b, CLUSTER]
+        c = np.uint32(f.block[b, CLUSTER])  # without a sign an index is not checked for it
         moved = body[c, k] + body[c, d + k] * (t - body[c, 2 * d + SINCE])
         return f.place[b, k] + moved
 
@@ -83,9 +85,15 @@ def bind(d):
     def insert(f, b, cell):
         """Put a block into a cell."""
         block, head = f.block, f.head
+        q, mixed = head[cell], np.int32(0)
+        if q >= 0:
+            mixed = q & MIXED
+            q ^= mixed
+            if block[q, CLUSTER] != block[b, CLUSTER]:
+                mixed = MIXED
         block[b, CELL] = cell
-        block[b, NEXT] = head[cell]
-        head[cell] = b
+        block[b, NEXT] = q
+        head[cell] = np.int32(b) | mixed
 
     @piece
     def rebin(f, b, t):
@@ -94,13 +102,14 @@ def bind(d):
         cell, old = cell_at(f, b, t), block[b, CELL]
         if cell == old:
             return
-        q = head[old]
+        mixed = head[old] & MIXED
+        q, after = head[old] ^ mixed, block[b, NEXT]
         if q == b:
-            head[old] = block[b, NEXT]
+            head[old] = after | mixed if after >= 0 else after
         else:
             while block[q, NEXT] != b:
                 q = block[q, NEXT]
-            block[q, NEXT] = block[b, NEXT]
+            block[q, NEXT] = after
         insert(f, np.int64(b), cell)
 
     @piece
@@ -109,8 +118,12 @@ def bind(d):
         block, rel, radius = f.block, f.rel, f.radius
         a, c = block[b, CLUSTER], block[q, CLUSTER]
         spread = f.count[SPREAD]
-        for i in range(block[b, FIRST], block[b + 1, FIRST]):
-            for j in range(block[q, FIRST], block[q + 1, FIRST]):
+        ones, others = block[b + 1, FIRST] - block[b, FIRST], block[q + 1, FIRST] - block[q, FIRST]
+        first, second = np.uint32(block[b, FIRST]), np.uint32(block[q, FIRST])
+        for m in range(ones):
+            i = np.uint32(first + m)
+            for n in range(others):
+                j = np.uint32(second + n)
                 square = 0.0
                 for k in range(d):
                     x = dx[k] + rel[j, k] - rel[i, k]
@@ -119,21 +132,26 @@ def bind(d):
                 near = radius[i * spread] + radius[j * spread] + f.clock[SKIN]
                 if square < near * near:
                     add(f, i, j, a, c)
-        f.count[CHECKED] += (block[b + 1, FIRST] - block[b, FIRST]) * (
-            block[q + 1, FIRST] - block[q, FIRST]
-        )
+        f.count[CHECKED] += ones * others
+
+    @piece
+    def along(f, q, k, t, still, x):
+        """Component of what leads to a block, a `still` one at its place."""
+        return (f.place[q, k] if still else centre(f, q, k, t)) - x[k]
 
     @piece
     def look(f, b, q, t, still, x, dx, reach):
-        """List the pairs of two blocks, unless all are too far; a `still` one is at its place."""
+        """List the pairs of two blocks, unless all are too far."""
         half = f.half
         square = 0.0
         for k in range(d):
-            dx[k] = (f.place[q, k] if still else centre(f, q, k, t)) - x[k]
-            gap = dx[k] + shift(dx[k], f.period[k])
+            gap = along(f, q, k, t, still, x)
+            gap += shift(gap, f.period[k])
             gap = larger(abs(gap) - half[b, k] - half[q, k], 0.0)
             square += gap * gap
         if square < reach * reach:
+            for k in range(d):
+                dx[k] = along(f, q, k, t, still, x)
             list_discs(f, b, q, dx)
 
     @piece
@@ -165,7 +183,7 @@ def bind(d):
 
         If all blocks are listed, each pair is looked at from one side: `forward`, or by numbers.
         """
-        block = f.block
+        block, head = f.block, f.head
         x, dx = work[0], work[1]
         own = block[b, CLUSTER]
         reach = f.clock[WIDEST] + f.clock[SKIN]
@@ -186,17 +204,29 @@ def bind(d):
                         if near[2, three] < 0:
                             continue
                         cell += near[2, three]
-                    q = np.int64(f.head[cell])
-                    if forward and middle and (d == 2 or three == 1):
-                        q = np.int64(block[b, NEXT])
+                    q = head[cell]
+                    if q < 0:
+                        continue
+                    mixed = q & MIXED
+                    q ^= mixed
+                    if mixed == 0 and block[q, CLUSTER] == own:
+                        continue
+                    whole = not (forward and middle and (d == 2 or three == 1))
+                    if not whole:
+                        q = block[b, NEXT]
+                    alone = whole
                     while q >= 0:
                         c = block[q, CLUSTER]
-                        if c != own and (
-                            forward or (q > b if still else f.group[c, LISTED_IN] != batch)
-                        ):
-                            checked += 1
-                            look(f, b, q, t, still, x, dx, reach)
-                        q = np.int64(block[q, NEXT])
+                        if c != own:
+                            alone = False
+                            if forward or (
+                                q > b if still else f.group[np.uint32(c), LISTED_IN] != batch
+                            ):
+                                checked += 1
+                                look(f, b, np.uint32(q), t, still, x, dx, reach)
+                        q = block[q, NEXT]
+                    if alone:  # others have left, or become one with this
+                        head[cell] ^= MIXED
         f.count[LISTED] += 1
         f.count[CHECKED] += checked
 
@@ -231,7 +261,7 @@ def bind(d):
                 if batch > 0 and group[c, LISTED_IN] != batch - 1:
                     continue
                 b = np.int64(group[c, START])
-            while b != stop:
+            while b != stop and f.count[FULL] == 0:
                 search(f, b, t, batch, forward, work, near)
                 b = b + 1 if batch == 0 else np.int64(f.block[b, CHAIN])
             if groups > 0:

@@ -59,9 +59,10 @@ def bind(d):
             f.rel,
             f.place,
         )
-        i, j = half_edge[2 * p, DISC], half_edge[2 * p + 1, DISC]
-        g, h = disc[i, BLOCK], disc[j, BLOCK]
-        m, n = block[g, CLUSTER], block[h, CLUSTER]
+        # without a sign an index is not checked for it
+        i, j = np.uint32(half_edge[2 * p, DISC]), np.uint32(half_edge[2 * p + 1, DISC])
+        g, h = np.uint32(disc[i, BLOCK]), np.uint32(disc[j, BLOCK])
+        m, n = np.uint32(block[g, CLUSTER]), np.uint32(block[h, CLUSTER])
         spread = f.count[SPREAD]
         s = radius[i * spread] + radius[j * spread]
         dm, dn = t - body[m, since], t - body[n, since]
@@ -121,11 +122,11 @@ def bind(d):
         half_edge, disc, block = f.half_edge, f.disc, f.block
         for k in range(count):
             h = lot[k, HALF]
-            lot[k, NEAR_BLOCK] = disc[half_edge[h, DISC], BLOCK]
-            lot[k, FAR_BLOCK] = disc[half_edge[h ^ 1, DISC], BLOCK]
+            lot[k, NEAR_BLOCK] = disc[np.uint32(half_edge[h, DISC]), BLOCK]
+            lot[k, FAR_BLOCK] = disc[np.uint32(half_edge[h ^ 1, DISC]), BLOCK]
         for k in range(count):
-            lot[k, NEAR_CLUSTER] = block[lot[k, NEAR_BLOCK], CLUSTER]
-            lot[k, FAR_CLUSTER] = block[lot[k, FAR_BLOCK], CLUSTER]
+            lot[k, NEAR_CLUSTER] = block[np.uint32(lot[k, NEAR_BLOCK]), CLUSTER]
+            lot[k, FAR_CLUSTER] = block[np.uint32(lot[k, FAR_BLOCK]), CLUSTER]
 
     @cold_piece
     def predict_listed(f, t):

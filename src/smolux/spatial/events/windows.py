@@ -107,8 +107,9 @@ def bind(d):
         empty(f, t)
         f.count[REBUILT] += 1
         list_blocks(f, none, none, np.int64(f.place.shape[0]), t, none, work, near)
-        look_ahead(f, none, all_, none)
-        predict_listed(f, t)
+        if f.count[FULL] == 0:
+            look_ahead(f, none, all_, none)
+            predict_listed(f, t)
 
     @piece
     def relist_due(f, work, near):
