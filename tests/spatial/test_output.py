@@ -46,15 +46,53 @@ def test_extended_xyz(result, tmp_path):
     assert len(list(read_xyz(sp.write_trajectory(result, tmp_path / "b.xyz", frames=4)))) == 4
 
 
-def test_gsd(result, tmp_path):
+@pytest.fixture(scope="module")
+def spheres():
+    return sp.simulate(sp.random(20, 0.05, dimension=3, seed=3, walls="periodic"), until=2.0)
+
+
+def test_extended_xyz_by_another_reader(result, spheres, tmp_path):
+    read = pytest.importorskip("ase.io").read
+    for tree, name in ((result, "a.xyz"), (spheres, "b.xyz")):
+        system, times = sp.system_of(tree), [0.0, 1.0]
+        d, box = system.dimension, system.box
+        frames = read(sp.write_trajectory(tree, tmp_path / name, times), index=":")
+        assert [frame.info["Time"] for frame in frames] == times
+        for frame, time in zip(frames, times, strict=True):
+            state = sp.replay(tree, time)
+            np.testing.assert_allclose(frame.cell.lengths()[:d], box.lengths, rtol=1e-15)
+            np.testing.assert_array_equal(frame.pbc[:d], box.periodic)
+            np.testing.assert_allclose(
+                frame.positions[:, :d], box.wrap(state["position"]), rtol=1e-9, atol=1e-9
+            )
+            np.testing.assert_allclose(frame.arrays["radius"], state["radius"], rtol=1e-9)
+            np.testing.assert_allclose(frame.arrays["velo"][:, :d], state["velocity"], rtol=1e-9)
+            np.testing.assert_array_equal(frame.arrays["cluster"], state["cluster"])
+
+
+def test_gsd(result, spheres, tmp_path):
     hoomd = pytest.importorskip("gsd.hoomd")
-    with hoomd.open(sp.write_trajectory(result, tmp_path / "a.gsd", [0, 1.0])) as trajectory:
-        frame = trajectory[1]
-        assert frame.configuration.dimensions == 2
-        at = frame.particles.position[:, :2] + 3
-        box = sp.system_of(result).box
-        np.testing.assert_allclose(at, box.wrap(sp.replay(result, 1.0)["position"]), atol=1e-5)
-        np.testing.assert_allclose(frame.particles.diameter, 2 * result["radius"], rtol=1e-6)
+    for tree, name in ((result, "a.gsd"), (spheres, "b.gsd")):
+        system, times = sp.system_of(tree), [0.0, 1.0, 2.0]
+        d, box = system.dimension, system.box
+        with hoomd.open(sp.write_trajectory(tree, tmp_path / name, times)) as trajectory:
+            assert len(trajectory) == len(times)
+            for number, (frame, time) in enumerate(zip(trajectory, times, strict=True)):
+                state, particles = sp.replay(tree, time), frame.particles
+                assert frame.configuration.step == number
+                assert frame.configuration.dimensions == d
+                sides = frame.configuration.box
+                np.testing.assert_allclose(sides[:d], box.lengths, rtol=1e-6)
+                np.testing.assert_array_equal(sides[3:], 0)
+                at = particles.position[:, :d] + np.array(box.lengths) / 2
+                np.testing.assert_allclose(at, box.wrap(state["position"]), atol=1e-5)
+                assert (abs(particles.position) <= sides[:3] / 2).all()
+                np.testing.assert_allclose(particles.diameter, 2 * state["radius"], rtol=1e-6)
+                np.testing.assert_allclose(particles.velocity[:, :d], state["velocity"], atol=1e-6)
+                np.testing.assert_allclose(particles.mass, system.mass, rtol=1e-6)
+                np.testing.assert_array_equal(particles.charge, state["cluster"])
+                np.testing.assert_array_equal(frame.log["particles/cluster"], state["cluster"])
+                np.testing.assert_array_equal(frame.log["time"], [time])
 
 
 def test_a_missing_package_is_named(result, tmp_path, monkeypatch):
@@ -146,3 +184,24 @@ def test_movie(result, tmp_path):
     with pytest.raises(sx.InputError) as caught:
         plotting.movie(result, tmp_path / "a.avi", rate=0, pixels=121, colour="red")
     assert len(caught.value.problems) == 4
+
+
+def test_movie_in_mp4(result, tmp_path):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    times = [0.0, 1.0, result.attrs["time_reached"]]
+    file = plotting.movie(result, tmp_path / "a.mp4", times, rate=5, pixels=160)
+    reader = ffmpeg.read_frames(str(file))
+    about = next(reader)
+    width, height = about["size"]
+    assert (width, about["fps"], about["codec"]) == (160, 5, "h264")
+    shown = [np.frombuffer(f, np.uint8).reshape(height, width, 3).astype(float) for f in reader]
+    assert len(shown) == len(times)
+    # the same pictures as in the GIF, but for its palette and the compression of the MP4
+    gif = plotting.movie(result, tmp_path / "a.gif", times, pixels=160)
+    with pytest.importorskip("PIL.Image").open(gif) as picture:
+        for k, frame in enumerate(shown):
+            picture.seek(k)
+            drawn = np.asarray(picture.convert("RGB"), float)
+            off = [abs(drawn - other).mean() for other in shown]
+            assert off[k] < 5
+            assert sorted(off)[1] > 3 * off[k]  # and far from the others

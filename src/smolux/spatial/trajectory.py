@@ -161,9 +161,9 @@ def _write_gsd(file: Path, result: xr.DataTree, instants: Float) -> None:
     middle = np.array(system.box.lengths) / 2  # boxes of GSD have the origin in their middle
     box: Box = system.box
     with hoomd.open(name=str(file), mode="w") as out:
-        for time, x, v, cluster in states(result, instants):
+        for step, (time, x, v, cluster) in enumerate(states(result, instants)):
             frame = hoomd.Frame()
-            frame.configuration.step = len(out)
+            frame.configuration.step = step
             frame.configuration.dimensions = system.dimension
             frame.configuration.box = [*sides, 0, 0, 0]
             particles = frame.particles
