@@ -199,7 +199,7 @@ def test_movie_in_mp4(result, tmp_path):
     # the same pictures as in the GIF, but for its palette and the compression of the MP4
     gif = plotting.movie(result, tmp_path / "a.gif", times, pixels=160)
     with pytest.importorskip("PIL.Image").open(gif) as picture:
-        for k, frame in enumerate(shown):
+        for k in range(len(shown)):
             picture.seek(k)
             drawn = np.asarray(picture.convert("RGB"), float)
             off = [abs(drawn - other).mean() for other in shown]
