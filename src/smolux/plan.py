@@ -88,7 +88,10 @@ class Plan:
         edges = np.unique([int(first * 2.0 ** (k / self.bins_per_octave)) for k in steps])
         # the mass itself is looked at where it may change
         orders = (*self.orders, 1.0) if self.model.open else self.orders
-        return Grid(np.array(self.times), edges.astype(np.int64), np.array(orders))
+        edges = edges.astype(np.int64)
+        octaves = np.int64(1) << np.arange(63)
+        before = np.maximum(np.searchsorted(edges, octaves, side="right") - 1, 0)
+        return Grid(np.array(self.times), edges, np.array(orders), before)
 
     def groups(self, workers: int, start: int = 0) -> list[tuple[int, int]]:
         """Split the replicas from `start` on: first and number of each group."""

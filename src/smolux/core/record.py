@@ -7,20 +7,29 @@ from functools import lru_cache
 from typing import Any
 
 from .compile import cold_piece, piece
+from .slots import octave
 from .state import EVENTS, MASS_IN, MASS_OUT, PARTICLES, VOLUME
 
 
 @piece
 def find_bin(grid, size):
     """Bin of a size: the last edge at or below it."""
-    low, high = 0, grid.edges.shape[0]
-    while high - low > 1:
-        middle = (low + high) // 2
-        if grid.edges[middle] <= size:
-            low = middle
-        else:
-            high = middle
-    return low
+    k = grid.first[octave(size)]
+    while k + 1 < grid.edges.shape[0] and grid.edges[k + 1] <= size:
+        k += 1
+    return k
+
+
+@piece
+def power(x, order):
+    """Power of a size; the usual whole ones need no call of a function."""
+    if order == 0.0:
+        return 1.0
+    if order == 1.0:
+        return x
+    if order == 2.0:
+        return x * x
+    return x**order
 
 
 @cold_piece
@@ -32,7 +41,7 @@ def tally_one(t, grid, size, count, p):
     t.bins[find_bin(grid, size)] += count
     x = float(size)
     for o in range(grid.orders.shape[0]):
-        t.sums[o] += count * x ** grid.orders[o]
+        t.sums[o] += count * power(x, grid.orders[o])
 
 
 @lru_cache(maxsize=64)

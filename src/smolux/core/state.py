@@ -159,11 +159,15 @@ class Tally(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """What is observed: output times, bin edges above L, orders of moments."""
+    """What is observed: output times, bin edges above L, orders of moments.
+
+    `first` has for each octave the last edge at or below its start, or the very first.
+    """
 
     times: np.ndarray
     edges: np.ndarray
     orders: np.ndarray
+    first: np.ndarray
 
 
 def new_state(rng: np.ndarray, processes: int, entries: int) -> State:

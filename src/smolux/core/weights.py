@@ -17,7 +17,7 @@ import numpy as np
 
 from . import rng
 from .compile import cold_piece, piece, user_piece
-from .record import find_bin
+from .record import find_bin, power
 
 #: sums closer to a whole number than this are that number
 _WHOLE = 1e-9
@@ -167,6 +167,6 @@ def make_tally(weight: Callable[..., Any]) -> Callable[..., Any]:
         t.bins[find_bin(grid, size)] += stood
         x = float(size)
         for o in range(grid.orders.shape[0]):
-            t.sums[o] += stood * x ** grid.orders[o]
+            t.sums[o] += stood * power(x, grid.orders[o])
 
     return tally

@@ -179,7 +179,7 @@ class SizeClass(Method):
         bits, chunk = self._bits(particles), _chunk(particles)
         classes = _class_of(2 * particles, bits) + (_OCTAVES << bits)
         lists = 4 * classes * ((particles >> chunk) + 2)
-        return 4 * particles + lists + 14 * classes**2 + (4 * classes << chunk)
+        return 4 * particles + lists + 18 * classes**2 + (4 * (classes + (2 << bits)) << chunk)
 
 
 def _chunk(particles: int) -> int:
@@ -192,16 +192,23 @@ def _class_of(size: int, bits: int) -> int:
 
 
 def _empty(replicas: int, classes: int, bits: int, chunk: int, particles: int, wide: bool) -> Work:
-    """Make arrays for this many classes and particles, without any."""
+    """Make arrays for this many classes, without particles."""
     # a class may hold all particles; every list may end in a chunk that is not full
     stride = (particles >> chunk) + 2
-    chunks = stride + classes
+    single = 2 << bits
+    chunks = stride + classes + single
     meta = np.zeros((replicas, META), np.int64)
-    meta[:, (BITS, CHUNK, FREE)] = bits, chunk, chunks
+    meta[:, (BITS, CHUNK, FREE)] = bits, chunk, chunks - single
     meta[:, NEXT], meta[:, STALE] = AHEAD, 1
     meta[:, WIDEST] = np.iinfo(np.int64).max if wide else _NARROW
     pairs = classes * (classes + 1) // 2
     free = np.tile(np.arange(chunks, dtype=np.int32)[::-1], (replicas, 1))
+
+    # each class of one size has a chunk for good, whose first entry is that size
+    where = np.zeros((replicas, classes, stride), np.int32)
+    where[:, :single, 0] = np.arange(single)
+    pool = np.zeros((replicas, chunks << chunk), np.int64 if wide else np.int32)
+    pool[:, np.arange(single) << chunk] = np.arange(single)
 
     def zeros(columns: int, kind: Any) -> Any:
         return np.zeros((replicas, columns), kind)
@@ -212,20 +219,27 @@ def _empty(replicas: int, classes: int, bits: int, chunk: int, particles: int, w
         room=zeros(classes, np.int64),
         flow=zeros(classes, np.int64),
         before=zeros(classes, np.int64),
-        where=np.zeros((replicas, classes, stride), np.int32),
+        where=where,
         free=free,
-        pool=zeros(chunks << chunk, np.int64 if wide else np.int32),
+        pool=pool,
         weight=zeros(pairs, float),
         share=zeros(pairs, float),
         alias=zeros(pairs, np.int32),
         classes=zeros(pairs, np.int32),
+        either=zeros(pairs, np.int64),
         queue=zeros(pairs, np.int32),
         one=zeros(AHEAD, np.int64),
         two=zeros(AHEAD, np.int64),
-        listed=np.arange(classes) >= 2 << bits,
+        mark=zeros(AHEAD, float),
+        wait=zeros(AHEAD, float),
+        mask=_mask(classes, single),
         high=np.full((classes, classes), np.nan),
         low=np.full((classes, classes), np.nan),
     )
+
+
+def _mask(classes: int, single: int) -> Int:
+    return np.where(np.arange(classes) < single, 0, -1)
 
 
 def _fill(work: Work, r: int, sizes: Int, counts: Int, edges: Int) -> None:
@@ -266,15 +280,15 @@ def _more_classes(work: Work, classes: int) -> Work:
     high[:old, :old], low[:old, :old] = work.high, work.low
     where = np.zeros((len(work.meta), classes, work.where.shape[2]), np.int32)
     where[:, :old] = work.where
-    listed = np.arange(classes) >= np.argmax(work.listed)
+    mask = _mask(classes, int(np.argmin(work.mask)))
     by_class = {
         f: enlarged(getattr(work, f), classes) for f in ("number", "room", "flow", "before")
     }
     by_pair = {
         f: enlarged(getattr(work, f), pairs)
-        for f in ("weight", "share", "alias", "classes", "queue")
+        for f in ("weight", "share", "alias", "classes", "either", "queue")
     }
-    return work._replace(high=high, low=low, listed=listed, where=where, **by_class, **by_pair)
+    return work._replace(high=high, low=low, mask=mask, where=where, **by_class, **by_pair)
 
 
 def _more_chunks(work: Work) -> Work:

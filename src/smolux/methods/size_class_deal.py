@@ -42,19 +42,19 @@ def _compiled() -> tuple[Any, Any]:
         for k in range(4):
             s[k] = words[k]
         for g in range(w.number.shape[0]):
-            if w.listed[g]:
+            if w.mask[g] != 0:
                 for _ in range(copies * w.number[g]):
                     number[below(s, parts), g] += 1
         total = np.int64(0)
         for k in range(parts):
             for g in range(w.number.shape[0]):
-                if w.listed[g]:
+                if w.mask[g] != 0:
                     next_free[k, g] = total
                     total += number[k, g]
         for k in range(4):
             s[k] = words[k]
         for g in range(w.number.shape[0]):
-            if w.listed[g]:
+            if w.mask[g] != 0:
                 for m in range(copies * w.number[g]):
                     k = below(s, parts)
                     sizes[next_free[k, g]] = size_at(w, g, m // copies)
@@ -63,7 +63,7 @@ def _compiled() -> tuple[Any, Any]:
     def collect(work, number, sizes):
         w, n = view(work, 0), np.int64(0)
         for g in range(number.shape[0]):
-            if not w.listed[g]:
+            if w.mask[g] == 0:
                 w.number[g] += number[g]
             else:
                 for _ in range(number[g]):
@@ -75,7 +75,7 @@ def _compiled() -> tuple[Any, Any]:
 
 def split(work: Any, parts: int, copies: int, words: NDArray[np.uint64]) -> list[Pile]:
     """Put every particle `copies` times into one of several piles, each as likely as the other."""
-    bits, listed = int(work.meta[0, BITS]), work.listed
+    bits, listed = int(work.meta[0, BITS]), work.mask != 0
     number = np.zeros((parts, len(listed)), np.int64)
     rng = np.random.default_rng(words)
     counts = copies * work.number[0, ~listed]

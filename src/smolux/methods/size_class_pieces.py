@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ..core import rng
-from ..core.alias import outcome
 from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
 from ..core.loop import PATIENCE, Pieces, note_bad, repair
@@ -30,7 +29,7 @@ from .size_class_store import (
     size_at,
     view,
 )
-from .size_class_table import prepare
+from .size_class_table import column, prepare
 
 #: a chosen particle is a number of this many bits within its class, and the class above them
 _SLOT_BITS = 44
@@ -60,20 +59,39 @@ def _seize(s, w, place):
     s.count[FIRST] = place
 
 
+@piece
+def _ask_for(w, one):
+    """Have the memory of a particle fetched; without a branch, also for those only counted."""
+    g = one >> _SLOT_BITS
+    prefetch(w.pool, place(w, g, one & _SLOT & w.mask[at(g)]))
+
+
 @cold_piece
-def _draw_ahead(w, words):
-    """Draw candidates: they depend on the table alone, not on the events in between."""
+def _draw_ahead(w, s, a, b, c, d):
+    """Draw candidates: they depend on the table alone, not on the events in between.
+
+    One kind of number after the other: short loops overlap their reads of memory.
+    """
     pairs = w.meta[PAIRS]
     for k in range(AHEAD):
-        classes = w.classes[at(outcome(w.share, w.alias, pairs, rng.uniform(words)))]
-        g, h = np.int64(classes >> 16), np.int64(classes & 0xFFFF)
-        a, b = rng.below(words, w.room[at(g)]), rng.below(words, w.room[at(h)])
-        w.one[at(k)], w.two[at(k)] = (g << _SLOT_BITS) | a, (h << _SLOT_BITS) | b
-        if w.listed[at(g)]:
-            prefetch(w.pool, place(w, g, a))
-        if w.listed[at(h)]:
-            prefetch(w.pool, place(w, h, b))
+        x, a, b, c, d = rng.uniform_of(a, b, c, d)
+        w.one[at(k)] = column(w.share, w.either, pairs, x)
+    for k in range(AHEAD):
+        g, h = w.one[at(k)] >> 16, w.one[at(k)] & 0xFFFF
+        x, a, b, c, d = rng.uniform_of(a, b, c, d)
+        y, a, b, c, d = rng.uniform_of(a, b, c, d)
+        x, y = x * w.room[at(g)], y * w.room[at(h)]
+        w.one[at(k)] = (g << _SLOT_BITS) | np.int64(x)
+        w.two[at(k)] = (h << _SLOT_BITS) | np.int64(y)
+    for k in range(AHEAD):
+        _ask_for(w, w.one[at(k)])
+        _ask_for(w, w.two[at(k)])
+        g, h = w.one[at(k)] >> _SLOT_BITS, w.two[at(k)] >> _SLOT_BITS
+        x, a, b, c, d = rng.uniform_of(a, b, c, d)
+        w.mark[at(k)] = -1.0 if x < w.low[at(g), at(h)] else x
+        w.wait[at(k)], a, b, c, d = rng.exponential_of(s, a, b, c, d)
     w.meta[NEXT] = 0
+    return a, b, c, d
 
 
 @cold_piece
@@ -89,7 +107,7 @@ def _make_find(rate: Any) -> Any:
     @piece
     def accepts(s, w, g, h, i, j, u, p):
         """Whether the rate accepts a candidate: 1 or 0; -1 if there is no rate."""
-        if u < w.low[at(g), at(h)]:
+        if u < 0.0:
             return 1
         value = rate(float(i), float(j), *p)
         if not 0.0 <= value <= w.high[at(g), at(h)]:
@@ -107,21 +125,17 @@ def _make_find(rate: Any) -> Any:
         waited, last = 0.0, trials + PATIENCE
         while trials < last:
             if w.meta[NEXT] == AHEAD:
-                s.rng[0], s.rng[1], s.rng[2], s.rng[3] = c0, c1, c2, c3
-                _draw_ahead(w, s.rng)
-                c0, c1, c2, c3 = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
+                c0, c1, c2, c3 = _draw_ahead(w, s.rng, c0, c1, c2, c3)
             k = w.meta[NEXT]
             w.meta[NEXT] = k + 1
             trials += 1
-            x, c0, c1, c2, c3 = rng.exponential_of(s.rng, c0, c1, c2, c3)
-            waited += x
+            waited += w.wait[at(k)]
             one, two = w.one[at(k)], w.two[at(k)]
             g, a, h, b = one >> _SLOT_BITS, one & _SLOT, two >> _SLOT_BITS, two & _SLOT
             if a >= w.number[at(g)] or b >= w.number[at(h)] or one == two:
                 continue
-            u, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)
             i, j = size_at(w, g, a), size_at(w, h, b)
-            taken = accepts(s, w, g, h, i, j, u, p)
+            taken = accepts(s, w, g, h, i, j, w.mark[at(k)], p)
             if taken < 0:
                 return math.nan, one, two, i, j, trials, c0, c1, c2, c3
             if taken == 1:

@@ -33,6 +33,9 @@ SHARE = 16
 class Work(NamedTuple):
     """Classes of sizes; those of one size are only counted, the others are lists.
 
+    A class of one size is a list whose entries are all in one place, where that size is: what is
+    done to a particle then needs no branch that a processor could not foresee.
+
     Attributes
     ----------
     meta : int64 array of shape (R, META)
@@ -54,12 +57,18 @@ class Work(NamedTuple):
     alias : int32 array of shape (R, P)
     classes : int32 array of shape (R, P)
         The two classes of each pair in the table, 16 bits each.
+    either : int64 array of shape (R, P)
+        The classes of the pair a column of the table keeps, in the upper half, and of its alias.
     queue : int32 array of shape (R, P)
         Scratch.
     one, two : int64 arrays of shape (R, AHEAD)
         Candidates drawn ahead: class and slot of the two particles.
-    listed : bool array of shape (G,)
-        Whether a class is a list.
+    mark : float64 array of shape (R, AHEAD)
+        What their rates are held against, as a share of the bound; below zero: they are accepted.
+    wait : float64 array of shape (R, AHEAD)
+        Their waiting times, of mean 1.
+    mask : int64 array of shape (G,)
+        For slots: -1 if a class is a list, 0 if its entries are in one place.
     high, low : float64 arrays of shape (G, G)
         Bounds of the rate for each pair of classes, the lower one as a share of the upper; `low` is
         NaN until asked for, `high` also where there is no finite bound.
@@ -77,10 +86,13 @@ class Work(NamedTuple):
     share: np.ndarray
     alias: np.ndarray
     classes: np.ndarray
+    either: np.ndarray
     queue: np.ndarray
     one: np.ndarray
     two: np.ndarray
-    listed: np.ndarray
+    mark: np.ndarray
+    wait: np.ndarray
+    mask: np.ndarray
     high: np.ndarray
     low: np.ndarray
 
@@ -101,10 +113,13 @@ def view(w, r):
         w.share[r],
         w.alias[r],
         w.classes[r],
+        w.either[r],
         w.queue[r],
         w.one[r],
         w.two[r],
-        w.listed,
+        w.mark[r],
+        w.wait[r],
+        w.mask,
         w.high,
         w.low,
     )
@@ -119,7 +134,7 @@ def place(w, g, slot):
 @piece
 def size_at(w, g, slot):
     """Size of a particle."""
-    if not w.listed[at(g)]:
+    if w.mask[at(g)] == 0:
         return np.int64(g)
     return np.int64(w.pool[at(place(w, g, slot))])
 
@@ -129,7 +144,7 @@ def remove(w, g, slot):
     """Take a particle out: the last of its class moves into the gap."""
     last = w.number[at(g)] - 1
     w.number[at(g)] = last
-    if w.listed[at(g)]:
+    if w.mask[at(g)] != 0:
         w.pool[at(place(w, g, slot))] = w.pool[at(place(w, g, last))]
         bits = w.meta[CHUNK]
         if last & ((1 << bits) - 1) == 0:
@@ -151,7 +166,7 @@ def append(w, g, size):
 def insert(w, size, count):
     """Put particles of one size in; there must be free chunks."""
     g = slot_of(size, w.meta[BITS])
-    if w.listed[at(g)]:
+    if w.mask[at(g)] != 0:
         for _ in range(count):
             append(w, g, size)
     else:
@@ -164,14 +179,12 @@ def insert(w, size, count):
 @piece
 def chunks_for(w, size, count):
     """Chunks that particles of one size may need; more than there are if they have no room."""
-    g = slot_of(size, w.meta[BITS])
+    g, bits = slot_of(size, w.meta[BITS]), w.meta[CHUNK]
     if g >= w.number.shape[0] or size > w.meta[WIDEST]:
         return w.meta[FREE] + 1
-    if not w.listed[at(g)]:
-        return 0
-    if (w.number[at(g)] + count) >> w.meta[CHUNK] >= w.where.shape[1]:
+    if ((w.number[at(g)] + count) & w.mask[at(g)]) >> bits >= w.where.shape[1]:
         return w.meta[FREE] + 1
-    return (count >> w.meta[CHUNK]) + 1
+    return ((count >> bits) + 1) & w.mask[at(g)]
 
 
 @cold_piece
@@ -180,7 +193,7 @@ def double(s, w):
     bits = w.meta[CHUNK]
     chunks = np.int64(0)
     for g in range(w.number.shape[0]):
-        if w.listed[g]:
+        if w.mask[g] != 0:
             end = (2 * w.number[g]) >> bits
             chunks += end - (w.number[g] >> bits) + 1
             if end >= w.where.shape[1]:
@@ -189,7 +202,7 @@ def double(s, w):
         return False
     for g in range(w.number.shape[0]):
         n = w.number[g]
-        if w.listed[g]:
+        if w.mask[g] != 0:
             for slot in range(n):
                 append(w, g, w.pool[place(w, g, slot)])
         else:
@@ -210,7 +223,7 @@ def make_visit(tally):
         for g in range(1, w.number.shape[0]):
             if w.number[g] == 0:
                 continue
-            if not w.listed[g]:
+            if w.mask[g] == 0:
                 tally(t, grid, np.int64(g), w.number[g], p)
                 largest = np.int64(g)
                 continue

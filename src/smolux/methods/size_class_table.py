@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..core.alias import build
-from ..core.compile import cold_piece, piece
+from ..core.compile import at, cold_piece, piece
 from ..core.slots import slot_top
 from ..core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
 from .size_class_store import AHEAD, BITS, BLOCK, CHUNK, NEXT, PAIRS, SHARE, SPAN, STALE
@@ -53,7 +53,7 @@ def _give_room(s, w, used):
         spread = math.sqrt(2.0 * math.log(worth)) if worth > 1.0 else 0.0
         slack = events * gain + spread * math.sqrt(events * come)
         w.room[g] = w.number[g] + np.int64(slack + 0.5)
-        if w.listed[g]:
+        if w.mask[g] != 0:
             w.room[g] = min(w.room[g], most)
         w.before[g] = w.number[g]
         w.flow[g] //= 2
@@ -110,7 +110,18 @@ def _renew(s, w):
     pairs = w.meta[PAIRS]
     if pairs > 0:
         build(w.weight[:pairs], s.clock[MAJORANT], w.share, w.alias, w.queue)
+        for k in range(pairs):
+            w.either[k] = (np.int64(w.classes[k]) << 32) | w.classes[w.alias[k]]
     return 0
+
+
+@piece
+def column(share, either, n, x):
+    """Return the two classes of a pair for a uniform number, as `alias.outcome` would."""
+    x *= n
+    k = np.int64(x)
+    both = either[at(k)]
+    return both >> 32 if x - k < share[at(k)] else both & 0xFFFFFFFF
 
 
 @piece
