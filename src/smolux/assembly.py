@@ -181,8 +181,8 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
     if not lone and not sources:
         fire = make_fire(pieces.pair, pieces.update, outcome, factor, random, len(pairs))
         burst = None
-        if pieces.burst is not None and not random:
-            burst = make_burst(pieces.burst, outcome, len(pairs))
+        if pieces.burst is not None:
+            burst = make_burst(pieces.burst, outcome, len(pairs), random)
         return make_loop(pieces, make_next_event(pieces.draw, burst), fire)
     about = [beside.Lone(p.law, type(p).outcome, p.least, p.splits, p.opens) for p in lone]
     shape = len(pairs), len(lone), len(sources)

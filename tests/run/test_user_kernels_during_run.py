@@ -137,9 +137,19 @@ def test_bounds_that_do_not_hold_are_repaired(method: str, bounds: Any) -> None:
 
 
 @pytest.mark.slow
-def test_events_in_a_row_are_those_of_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("method", "weighting"),
+    [
+        (sx.methods.AcceptanceRejection, "number"),
+        (sx.methods.AcceptanceRejection, "mass-flow"),
+        (sx.methods.SizeClass, "number"),
+        (sx.methods.SizeClass, sx.weighting.WeightFunction(0.5)),
+    ],
+)
+def test_events_in_a_row_are_those_of_the_loop(
+    monkeypatch: pytest.MonkeyPatch, method: Any, weighting: Any
+) -> None:
     """With repairs, shattering and doubling on the way, whole states are the same bit for bit."""
-    method = sx.methods.AcceptanceRejection
     bind, kernel = method.bind, sx.kernels.from_function(odd, value=8.0, bounds=below_one)
     physics = sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(0.05)])
     states = []
@@ -148,7 +158,8 @@ def test_events_in_a_row_are_those_of_the_loop(monkeypatch: pytest.MonkeyPatch) 
             plain = staticmethod(lambda *given: bind(*given)._replace(burst=None))
             monkeypatch.setattr(method, "bind", plain)
             monkeypatch.setattr(assembly, "_loops", {})
-        group = Group.start(runs.plan(physics, [3.0, 30.0], method.name, particles=2000), 0, 2)
+        plan = runs.plan(physics, [3.0, 30.0], method.name, weighting=weighting, particles=2000)
+        group = Group.start(plan, 0, 2)
         group.advance(lambda: False)
         states.append(group.state)
     assert states[0].count[0, REPAIRS] > 0

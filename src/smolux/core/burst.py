@@ -53,10 +53,10 @@ class Burst(NamedTuple):
     find : ``find(s, w, p, factor, held, particles, trials, *words)``
         As `Pieces.draw`: the waiting time, the slots of the pair (-1: nothing happens then) and
         its sizes, the candidates looked at so far and the four words of the random generator.
-    replace : ``replace(w, held, first, second, size, count)``
-        Take the pair out and put `count` particles of a size in: `PLAIN`, or `LAST` if
-        `Pieces.prepare` has to look at what that made; `NOT_PLAIN`, with nothing changed, if it is
-        not within the room or the bounds in force. And what is held then.
+    replace : ``replace(w, held, first, second, gone, size, count)``
+        Take one of the pair or both out (bits 1 and 2) and put `count` particles of a size in:
+        `PLAIN`, or `LAST` if `Pieces.prepare` has to look at what that made; `NOT_PLAIN`, with
+        nothing changed, if it is not within the room or the bounds in force. And what is held then.
     release : ``release(s, held)``
         Write what is held to the state.
     """
@@ -102,8 +102,10 @@ def _make_choose(pairs: int) -> Any:
     return choose
 
 
-def make_burst(brought: Burst, outcome: Callable[..., Any], pairs: int) -> Callable[..., Any]:
-    """Bind a burst to the outcomes of `pairs` processes, none of which draws random numbers.
+def make_burst(
+    brought: Burst, outcome: Callable[..., Any], pairs: int, random: bool
+) -> Callable[..., Any]:
+    """Bind a burst to the outcomes of `pairs` processes; `random` if they draw random numbers.
 
     Returns
     -------
@@ -141,16 +143,20 @@ def make_burst(brought: Burst, outcome: Callable[..., Any], pairs: int) -> Calla
                     r = choose(windows, window, u * factor)
                     first = first if r >= 0 else -1
             if r >= 0:
+                if random:
+                    s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
                 entries, gone = outcome(r, i, j, s, p, q)
                 size, count = s.sizes[0], s.counts[0]
-                if entries == 1 and gone == 3 and size < LIMIT and s.count[REPAIRS] == repairs:
-                    done, held = replace(w, held, first, second, size, count)
+                if entries == 1 and gone > 0 and size < LIMIT and s.count[REPAIRS] == repairs:
+                    done, held = replace(w, held, first, second, gone, size, count)
+                if random and done != NOT_PLAIN:  # else the loop draws the same numbers again
+                    a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
             if done == NOT_PLAIN:
                 s.count[FIRST], s.count[SECOND], s.count[PROCESS] = first, second, r
                 s.clock[PENDING] = pending
                 s.count[PHASE] = FIRE
                 break
-            n += count - 2
+            n += count - (2 if gone == 3 else 1)
             events += 1
             s.events[r] += 1
             time = pending

@@ -78,12 +78,7 @@ def make_rounding(weight: Callable[..., Any]) -> Callable[..., Any]:
     """Bind the rounding of what appears: ``rounded(s, entries, top, p)``, how many are left."""
 
     @cold_piece
-    def rounded(s, entries, top, p):
-        if entries == 1:  # the common case, in which there may be nothing to round
-            x = s.counts[0] * (weight(s.sizes[0], p) / top)
-            if x == math.floor(x):
-                s.counts[0] = np.int64(x)
-                return 1 if x > 0.0 else 0
+    def drawn(s, entries, top, p):
         u = rng.uniform(s.rng)
         total, before, kept = 0.0, np.int64(0), 0
         for e in range(entries):
@@ -95,6 +90,15 @@ def make_rounding(weight: Callable[..., Any]) -> Callable[..., Any]:
             before = upto
         return kept
 
+    @piece
+    def rounded(s, entries, top, p):
+        if entries == 1:  # the common case, in which there may be nothing to round
+            x = s.counts[0] * (weight(s.sizes[0], p) / top)
+            if x == math.floor(x):
+                s.counts[0] = np.int64(x)
+                return 1 if x > 0.0 else 0
+        return drawn(s, entries, top, p)
+
     return rounded
 
 
@@ -105,14 +109,16 @@ def make_outcome(outcome: Callable[..., Any], weight: Callable[..., Any]) -> Cal
     @piece
     def weighted(r, i, j, s, p, q):
         entries, _ = outcome(r, i, j, s, p, q)
-        one, two = weight(i, p), weight(j, p)
-        top = max(one, two, weight(i + j, p))
-        entries = rounded(s, entries, top, p)
+        one, two, both = weight(i, p), weight(j, p), weight(i + j, p)
+        top = max(one, two, both)
+        joined = entries == 1 and s.counts[0] == 1 and s.sizes[0] == i + j
+        if not joined or both < top:  # else there is nothing to round
+            entries = rounded(s, entries, top, p)
         stays = 1.0 - one / top
-        both = nearly_whole(stays + (1.0 - two / top))
+        stay = nearly_whole(stays + (1.0 - two / top))
         u = rng.uniform(s.rng)
         first = int(u < stays)
-        second = int(u < both) + int(u + 1.0 < both) - first
+        second = int(u < stay) + int(u + 1.0 < stay) - first
         return entries, 3 - first - 2 * second
 
     return weighted

@@ -194,6 +194,21 @@ def _exchange(w, monomers, stored, a, b, size, count):
 
 
 @piece
+def _exchange_one(w, monomers, stored, slot, size, count):
+    """Take the particle of a slot out and put others in: one, or any number of monomers."""
+    place = slot - monomers
+    if place < 0:
+        monomers -= 1
+    else:  # the last of its kind moves into the gap
+        stored -= 1
+        w.sizes[at(place)] = w.sizes[at(stored)]
+    if size == 1:
+        return monomers + count, stored
+    w.sizes[at(stored)] = size
+    return monomers, stored + 1
+
+
+@piece
 def _row(s, w):
     if w.ahead[0] < 0.0 or s.clock[MAJORANT] <= 0.0:
         return 0
@@ -214,11 +229,15 @@ def _hold(s, w):
 
 
 @piece
-def _replace(w, held, a, b, size, count):
+def _replace(w, held, a, b, gone, size, count):
     room = held.stored + SLACK <= w.sizes.shape[0]
     if size < held.bottom or size >= held.top or not room or (size > 1 and count > 1):
         return NOT_PLAIN, held
-    monomers, stored = _exchange(w, held.monomers, held.stored, a, b, size, count)
+    if gone == 3:
+        monomers, stored = _exchange(w, held.monomers, held.stored, a, b, size, count)
+    else:
+        one = a if gone == 1 else b
+        monomers, stored = _exchange_one(w, held.monomers, held.stored, one, size, count)
     smallest, largest = min(held.smallest, size), max(held.largest, size)
     return PLAIN, Held(monomers, stored, smallest, largest, held.bottom, held.top)
 

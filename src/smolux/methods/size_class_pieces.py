@@ -159,7 +159,12 @@ def _make_draw(find: Any) -> Any:
 
 
 @piece
-def _remove_both(w, a, b):
+def _remove(w, a, b, gone):
+    """Take one of a pair out, or both."""
+    if gone != 3:
+        one = a if gone == 1 else b
+        remove(w, one >> _SLOT_BITS, one & _SLOT)
+        return
     # the later place of a class goes first: then the other stays where it is
     remove(w, max(a, b) >> _SLOT_BITS, max(a, b) & _SLOT)
     remove(w, min(a, b) >> _SLOT_BITS, min(a, b) & _SLOT)
@@ -172,14 +177,9 @@ def _update(s, w, gone, entries, p):
         chunks += chunks_for(w, s.sizes[e], s.counts[e])
     if chunks > w.meta[FREE]:
         return False
-    a, b = s.count[FIRST], s.count[SECOND]
-    if gone == 3:
-        _remove_both(w, a, b)
-        s.count[PARTICLES] -= 2
-    elif gone > 0:
-        one = a if gone == 1 else b
-        remove(w, one >> _SLOT_BITS, one & _SLOT)
-        s.count[PARTICLES] -= 1
+    if gone > 0:
+        _remove(w, s.count[FIRST], s.count[SECOND], gone)
+        s.count[PARTICLES] -= 2 if gone == 3 else 1
     for e in range(entries):
         insert(w, s.sizes[e], s.counts[e])
         s.count[PARTICLES] += s.counts[e]
@@ -197,10 +197,10 @@ def _hold(s, w):
 
 
 @piece
-def _replace(w, held, a, b, size, count):
+def _replace(w, held, a, b, gone, size, count):
     if chunks_for(w, size, count) > w.meta[FREE]:
         return NOT_PLAIN, held
-    _remove_both(w, a, b)
+    _remove(w, a, b, gone)
     insert(w, size, count)
     return (PLAIN if w.meta[STALE] == 0 else LAST), held
 

@@ -23,15 +23,16 @@ _STEEPEST = 8.0
 
 
 def power(size: Any, q: Any) -> Any:
-    """Weight ``size**q``."""
-    return size**q
+    """Weight ``size**q``; a root costs a quarter of what a power does."""
+    return np.sqrt(size) if q == 0.5 else size**q
 
 
 def power_factor(i: Any, j: Any, q: Any) -> Any:
     """Return the largest of ``(i + j)**q``, ``i**q`` and ``j**q`` over ``(i j)**q``."""
     if q < 0.0:
         return np.maximum(i, j) ** (-q)
-    return (1.0 / i + 1.0 / j) ** q
+    total = 1.0 / i + 1.0 / j
+    return np.sqrt(total) if q == 0.5 else total**q
 
 
 def larger(x: Any, y: Any) -> Interval:
