@@ -19,7 +19,7 @@ from .errors import InputError, did_you_mean
 from .goal import Goal, make_goal
 from .initial import Initial
 from .methods import METHODS, AcceptanceRejection, SizeClass
-from .methods.auto import Auto, choose, costs, unforeseen
+from .methods.auto import Auto, Circumstances, choose, costs, unforeseen
 from .methods.base import Method
 from .model import Model
 from .population import POPULATIONS
@@ -191,7 +191,7 @@ def with_method(plan: Plan) -> Plan:
     """Let the method be chosen."""
     if plan.subvolumes > 1:
         return replace(plan, method=SizeClass(), reason="it mixes sub-volumes in the least time")
-    chosen = unforeseen(plan.model.processes) or choose(*_circumstances(plan))
+    chosen = unforeseen(plan.model.processes) or choose(_circumstances(plan))
     return replace(plan, method=chosen[0], reason=chosen[1])
 
 
@@ -204,17 +204,17 @@ def event_cost(plan: Plan) -> float:
     known = plan.subvolumes == 1 and unforeseen(plan.model.processes) is None
     if not known or not (plan.reason or isinstance(plan.method, AcceptanceRejection)):
         return 1.0
-    found, _ = costs(*_circumstances(plan))
+    found, _ = costs(_circumstances(plan))
     return min(found.values()) if plan.reason else found[AcceptanceRejection]
 
 
-def _circumstances(plan: Plan) -> tuple[Any, ...]:
+def _circumstances(plan: Plan) -> Circumstances:
     """Return what the estimate of costs takes."""
     initial = plan.model.initial
     sizes, counts = initial.sample(min(plan.particles, 1000), 0.5)
     mass = float(sizes @ counts)
     means = mass / float(counts.sum()), float(sizes.astype(float) ** 2 @ counts) / mass
-    return (
+    return Circumstances(
         rates_for(plan.model, plan.weighting),
         [p for p in plan.model.processes if isinstance(p, PairProcess)],
         plan.particles,

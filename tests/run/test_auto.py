@@ -10,7 +10,7 @@ import runs
 
 import smolux as sx
 from smolux.assembly import rates_for
-from smolux.methods.auto import candidates_per_event, choose
+from smolux.methods.auto import Circumstances, candidates_per_event, choose
 from smolux.weighting import Number
 
 AGGREGATION = [sx.processes.Aggregation()]
@@ -18,7 +18,7 @@ AGGREGATION = [sx.processes.Aggregation()]
 
 def estimate(kernel: Any, particles: int, end: float, processes: Any = AGGREGATION) -> float:
     rates = rates_for(sx.Model(kernel, processes), Number())
-    return candidates_per_event(rates, processes, particles, 1.0, (1.0, 1.0), end)
+    return candidates_per_event(Circumstances(rates, processes, particles, 1.0, (1.0, 1.0), end))
 
 
 def test_a_constant_kernel_is_never_rejected() -> None:
@@ -65,7 +65,7 @@ def test_what_is_chosen_and_why_stands_in_the_result() -> None:
 def test_kernels_far_below_their_bound_are_not_left_to_rejection() -> None:
     for kernel in (sx.kernels.GeneralizedBrownian(0.95), sx.kernels.Multiplicative()):
         rates = rates_for(sx.Model(kernel, AGGREGATION), Number())
-        method, reason = choose(rates, AGGREGATION, 100_000, 1.0, (1.0, 1.0), 100.0)
+        method, reason = choose(Circumstances(rates, AGGREGATION, 100_000, 1.0, (1.0, 1.0), 100.0))
         assert method.name == "size-class", reason
 
 
@@ -82,7 +82,7 @@ def test_one_product_and_few_particles_are_for_low_rank(
     kernel: Any, particles: int, method: str
 ) -> None:
     rates = rates_for(sx.Model(kernel, AGGREGATION), Number())
-    found, reason = choose(rates, AGGREGATION, particles, 1.0, (1.0, 1.0), 3.0)
+    found, reason = choose(Circumstances(rates, AGGREGATION, particles, 1.0, (1.0, 1.0), 3.0))
     assert found.name == method, reason
 
 

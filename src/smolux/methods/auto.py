@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,32 @@ def _start(mean: float, heavy: float) -> Float:
     # by a sample, which needs no special functions: these take longer to load than all of this
     sample = np.random.default_rng(0).standard_gamma(1.0 / excess, 4096)
     return np.asarray(np.maximum(np.quantile(sample, _SHARES) * mean * excess, 1.0))
+
+
+class Circumstances(NamedTuple):
+    """What the cost of a run is estimated from.
+
+    Attributes
+    ----------
+    rates : Rates
+        Of the kernel, weighted.
+    processes : sequence of PairProcess
+    particles : int
+        Simulated particles at the start.
+    density : float
+        Number density at the start.
+    sizes : tuple of float
+        Mean sizes at the start, by number and by mass.
+    end : float
+        Last output time.
+    """
+
+    rates: Rates
+    processes: Sequence[PairProcess]
+    particles: int
+    density: float
+    sizes: tuple[float, float]
+    end: float
 
 
 class _Grid:
@@ -143,36 +169,23 @@ class _Grid:
         return found
 
 
-def candidates_per_event(
-    rates: Rates,
-    processes: Sequence[PairProcess],
-    particles: int,
-    density: float,
-    sizes: tuple[float, float],
-    end: float,
-) -> float:
-    """Estimate the candidates that acceptance-rejection needs for an event, up to the time `end`.
+def candidates_per_event(run: Circumstances) -> float:
+    """Estimate the candidates that acceptance-rejection needs for an event, up to the end.
 
     By a rough solution of the rate equations, and the largest size to be expected of so many
     particles.
-
-    Parameters
-    ----------
-    rates, processes, particles, density, end
-        As for `choose`.
-    sizes : tuple of float
-        Mean sizes at the start, by number and by mass.
     """
-    grid = _Grid(rates, processes, min(_BEYOND * particles * sizes[0], 1e15))
-    course = grid.course(density, _start(*sizes), end)
+    largest_of_all = min(_BEYOND * run.particles * run.sizes[0], 1e15)
+    grid = _Grid(run.rates, run.processes, largest_of_all)
+    course = grid.course(run.density, _start(*run.sizes), run.end)
     if not course:
         return 1.0
     densities = np.array([entry[0] for entry in course])
     above = np.cumsum(densities[:, ::-1], axis=1)[:, ::-1] / densities.sum(axis=1, keepdims=True)
-    present = np.maximum((above * particles >= 1.0).sum(axis=1) - 1, 0)
+    present = np.maximum((above * run.particles >= 1.0).sum(axis=1) - 1, 0)
     largest, one = grid.size[present], np.ones(len(course))
     average, met = np.array([entry[1:] for entry in course]).T
-    bound = rates.bounds(one, largest, one, largest)[1]  # in one call: proofs are dear
+    bound = run.rates.bounds(one, largest, one, largest)[1]  # in one call: proofs are dear
     with np.errstate(all="ignore"):
         candidates = np.where(met > 0.0, np.maximum(bound / average, 1.0), 0.0)
     found = float(candidates @ met / met.sum())
@@ -189,29 +202,8 @@ def unforeseen(processes: Sequence[Process]) -> tuple[Method, str] | None:
     )
 
 
-def costs(
-    rates: Rates,
-    processes: Sequence[PairProcess],
-    particles: int,
-    density: float,
-    sizes: tuple[float, float],
-    end: float,
-) -> tuple[dict[type[Method], float], float]:
+def costs(run: Circumstances) -> tuple[dict[type[Method], float], float]:
     """Estimate what an event costs by the methods that may be chosen.
-
-    Parameters
-    ----------
-    rates : Rates
-        Of the kernel, weighted.
-    processes : sequence of PairProcess
-    particles : int
-        Simulated particles at the start.
-    density : float
-        Number density at the start.
-    sizes : tuple of float
-        Mean sizes at the start, by number and by mass.
-    end : float
-        Last output time.
 
     Returns
     -------
@@ -220,33 +212,26 @@ def costs(
     candidates : float
         Of acceptance-rejection for an event.
     """
-    candidates = candidates_per_event(rates, processes, particles, density, sizes, end)
+    candidates = candidates_per_event(run)
     found: dict[type[Method], float] = {
-        AcceptanceRejection: _EVENT + _FEW / particles + _TRIAL * candidates,
-        SizeClass: _CLASS_EVENT + _CLASS_FEW / particles,
+        AcceptanceRejection: _EVENT + _FEW / run.particles + _TRIAL * candidates,
+        SizeClass: _CLASS_EVENT + _CLASS_FEW / run.particles,
     }
-    known = rates.majorant
+    known = run.rates.majorant
     if known is not None and len(known.terms) == 1 and known.least == 1.0:
-        found[LowRank] = _PRODUCT_EVENT + _PRODUCT_FEW / particles
+        found[LowRank] = _PRODUCT_EVENT + _PRODUCT_FEW / run.particles
     return found, candidates
 
 
-def choose(
-    rates: Rates,
-    processes: Sequence[PairProcess],
-    particles: int,
-    density: float,
-    sizes: tuple[float, float],
-    end: float,
-) -> tuple[Method, str]:
-    """Choose a method and say why; parameters as for `costs`.
+def choose(run: Circumstances) -> tuple[Method, str]:
+    """Choose a method and say why.
 
     Returns
     -------
     method : Method
     reason : str
     """
-    found, candidates = costs(rates, processes, particles, density, sizes, end)
+    found, candidates = costs(run)
     estimate = "more than a million" if candidates > 1e6 else f"about {candidates:.2g}"
     others = "".join(
         f"; the {method.title} method some {cost:.2g} ns"
