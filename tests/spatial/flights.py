@@ -32,6 +32,25 @@ def system(number: int, dimension: int = 2, most: int = 60) -> sp.System:
     )
 
 
+def wide_system(number: int, dimension: int = 2, most: int = 100) -> sp.System:
+    """One of many systems whose radii differ by a factor of 50 to 200."""
+    rng = np.random.default_rng(number)
+    n = int(rng.integers(most // 2, most))
+    ratio = float(rng.uniform(50, 200))
+    # few large discs: by a power law, or two kinds
+    radii = ratio ** (rng.random(n) ** 2 if number % 2 else rng.random(n) < 0.1)
+    radii[:2] = 1, ratio
+    return sp.random(
+        n,
+        float(rng.choice([0.02, 0.1] if dimension == 2 else [0.005, 0.02])),
+        radii=radii,
+        dimension=dimension,
+        walls=WALLS[number // 2 % 3][:dimension],
+        velocities="maxwellian" if number // 4 % 2 else "unit",
+        seed=number,
+    )
+
+
 def run(system: sp.System, method: str | SpatialMethod, until: float = np.inf, clusters: int = 1):
     """Run to the end; return the trace, with the reason why it ended."""
     chosen = METHODS[method]() if isinstance(method, str) else method

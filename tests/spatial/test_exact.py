@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import plain_numpy
 import pytest
-from flights import assert_same, merges, run, system
+from flights import assert_same, merges, run, system, wide_system
 
 import smolux.spatial as sp
 
@@ -29,6 +29,28 @@ def test_in_space_against_plain_numpy(number):
         np.testing.assert_array_equal(merges(trace), [[i, j] for _, i, j in expected])
         times = trace.log.time[trace.log.merges]
         np.testing.assert_allclose(times, [t for t, _, _ in expected], rtol=1e-9)
+
+
+@pytest.mark.parametrize("number", range(30))
+def test_radii_that_differ_widely(number):
+    s = wide_system(number)
+    assert s.radius.max() >= 50 * s.radius.min()
+    pairs = run(s, "all-pairs")
+    assert len(merges(pairs)) == len(s) - 1
+    assert_same(run(s, "windowed"), pairs)
+    thin = sp.Windowed(skin=2 * s.radius.mean())
+    assert len(thin.start(s, np.empty(0)).flight.cells) > 1  # grids for several levels
+    assert_same(run(s, thin), pairs)
+
+
+@pytest.mark.parametrize("number", range(8))
+def test_radii_that_differ_widely_in_space(number):
+    s = wide_system(number, dimension=3, most=40)
+    trace = run(s, sp.Windowed(skin=2 * s.radius.mean()))
+    expected = plain_numpy.merges(s)
+    np.testing.assert_array_equal(merges(trace), [[i, j] for _, i, j in expected])
+    times = trace.log.time[trace.log.merges]
+    np.testing.assert_allclose(times, [t for t, _, _ in expected], rtol=1e-9)
 
 
 @pytest.mark.parametrize("number", range(5))

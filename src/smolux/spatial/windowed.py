@@ -50,11 +50,30 @@ def _rows(count: int, **columns: tuple[str, int]) -> NDArray[Any]:
 
 def _first_skin(system: System) -> float:
     """Return a skin within which discs at random have so many others as there is room for."""
-    d = system.dimension
+    r, d = system.radius, system.dimension
+    one, two = 2 * r.mean(), 2 * (r**2).mean() + 2 * r.mean() ** 2  # moments of r_i + r_j
     unit = np.pi * (1 if d == 2 else 4 / 3)
-    inner = float(((2 * system.radius) ** d).mean())
     room = 2 * _LISTED * system.box.volume / (len(system) * unit)
-    return float((inner + room) ** (1 / d) - inner ** (1 / d))
+    shell = [1, 2 * one, -room] if d == 2 else [1, 3 * one, 3 * two, -room]
+    roots = np.roots(shell)  # one of them is positive, as the signs change once
+    return float(max(root.real for root in roots if abs(root.imag) <= 1e-9 * abs(root)))
+
+
+def _levels(f: Any, room: float, spread: int, flight: Any) -> list[tuple[float, int]]:
+    """Give blocks their levels; return the largest diameter and the number of discs of each.
+
+    The cells of a level are about half as wide as those of the next one: what is much smaller than
+    the `room` that cells need anyway is of the lowest level.
+    """
+    if not spread:
+        return [(2 * float(f.radius[0]), len(f.rel))]
+    first = f.block[:-1, flight.FIRST]
+    width = 2 * np.maximum.reduceat(f.radius, first) + room
+    level = np.floor(np.log2(width.max() / width) * (1 - 1e-12)).astype(np.int64)
+    _, level = np.unique(-level, return_inverse=True)
+    f.block[:-1, flight.LEVEL] = level
+    discs = np.bincount(level, np.diff(f.block[:, flight.FIRST]))
+    return [(float(width[level == k].max()) - room, int(n)) for k, n in enumerate(discs)]
 
 
 @dataclass
@@ -111,7 +130,8 @@ class WindowedRun(Run):
         self.count[flight.SPREAD] = 0 if system.monodisperse else 1
         self.clock = np.zeros(flight.CLOCKS)
         self.clock[flight.SCALE] = float(np.sqrt((system.velocity**2).sum(1).max()))
-        self.clock[flight.WIDEST], self.clock[flight.LONGEST] = widest, max(box.lengths)
+        self.clock[flight.LONGEST] = max(box.lengths)
+        self.clock[flight.USUAL] = 2 * float(system.radius.mean())
         self.clock[flight.THICKEST] = thickest
         self.clock[flight.SKIN] = min(settings.skin or _first_skin(system), thickest)
         room = system.radius if system.wall_contact == "surface" else np.zeros(n)
@@ -181,8 +201,8 @@ class WindowedRun(Run):
             count=self.count,
             length=np.array(self.system.box.lengths),
             period=self.system.box.periods,
-            cells=np.ones(d, np.int64),
-            scale=np.ones(d),
+            cells=np.ones((1, d + 2), np.int64),
+            scale=np.ones((1, d + 2)),
             rel=disc["rel"],
             radius=np.full(n if self.count[flight.SPREAD] else 1, self.system.radius[0]),
             disc=disc["disc"],
@@ -200,24 +220,32 @@ class WindowedRun(Run):
         )
 
     def _gridded(self, f: Any) -> Any:
-        """Lay a grid for the skin: a block and all that it may be listed with are neighbours."""
-        flight = self._flight
-        skin = float(self.clock[flight.SKIN])
-        # the other one may have moved half a skin since it was binned
-        side = 2 * float(f.half.max()) + float(self.clock[flight.WIDEST]) + 1.5 * skin
-        cells = cells_for(self.system.box, side * (1 + 1e-6), len(f.rel))
+        """Lay grids for the skin, one for each level of radii.
+
+        A block and all of its level and below that it may be listed with are neighbours.
+        """
+        flight, box = self._flight, self.system.box
+        skin, d = float(self.clock[flight.SKIN]), self.system.dimension
+        extent = float(f.half.max()) * (1 + 1e-6)
+        levels = _levels(f, skin + extent, self.count[flight.SPREAD], flight)
+        cells = np.ones((len(levels), d + 2), np.int64)
+        scale = np.empty((len(levels), d + 2))
+        places = 0
+        for level, (widest, discs) in enumerate(levels):
+            # the other one may have moved half a skin since it was binned
+            side = 2 * extent + widest + 1.5 * skin
+            cells[level, :d] = cells_for(box, side * (1 + 1e-6), discs)
+            cells[level, d + flight.OFFSET] = places
+            cells[level, d + flight.FORWARD] = (cells[level, :d] > 2).all()
+            scale[level, :d] = cells[level, :d] / np.array(box.lengths)
+            scale[level, d + flight.WIDEST] = widest
+            scale[level, d + flight.EXTENT] = extent
+            places += int(np.prod(cells[level, :d]))
         self.clock[flight.BUDGET_OF_WAY] = skin / 2 * (1 - 1e-6)
         self.clock[flight.WINDOW] = -1.0
         self.count[flight.FULL] = 0
         self.count[flight.PACKED] = self.count[flight.WINDOWS]
-        for mark, of in (
-            (flight.MARK_LISTED, flight.LISTED),
-            (flight.MARK_CHECKED, flight.CHECKED),
-            (flight.MARK_PREDICTED, flight.PREDICTED),
-        ):
-            self.count[mark] = self.count[of]
-        scale = cells / np.array(self.system.box.lengths)
-        return f._replace(cells=cells, scale=scale, head=np.full(int(np.prod(cells)), -1, np.int32))
+        return f._replace(cells=cells, scale=scale, head=np.full(places, -1, np.int32))
 
     def _repack(self) -> None:
         f, flight, d = self.flight, self._flight, self.system.dimension
@@ -242,7 +270,7 @@ class WindowedRun(Run):
         """Make the skin thinner, or room, when something was full."""
         flight = self._flight
         if code == flight.NO_PAIRS:
-            if self.clock[flight.SKIN] > _THIN * self.clock[flight.WIDEST]:
+            if self.clock[flight.SKIN] > _THIN * self.clock[flight.USUAL]:
                 self.clock[flight.SKIN] /= 2
             else:
                 self._room[0] *= 2

@@ -18,9 +18,9 @@ SCALE = 2  # largest speed at the start
 SKIN = 3  # pairs whose surfaces are nearer than this are listed
 BUDGET_OF_WAY = 4  # how far a cluster may move before it is listed anew: half of the skin
 WINDOW = 5  # end of the window
-WIDEST = 6  # largest diameter
-LONGEST = 7  # longest side of the box
-THICKEST = 8  # the skin is at most this thick
+LONGEST = 6  # longest side of the box
+THICKEST = 7  # the skin is at most this thick
+USUAL = 8  # mean diameter
 CLOCKS = 9
 
 # Entries of Flight.count.
@@ -73,9 +73,17 @@ RESKIN = 6  # blocks are to be made anew, for the skin of the clock
 # Columns of Flight.disc.
 NAME, BLOCK = 0, 1
 
-# Columns of Flight.block: first disc, cluster, next block of the cluster, cell, next block of it.
-FIRST, CLUSTER, CHAIN, CELL, NEXT = 0, 1, 2, 3, 4
-BLOCK_COLUMNS = 5
+# Columns of Flight.block: first disc, cluster, next block of the cluster, cell, next block of it,
+# level of the radius of its discs, from that of the smallest ones on.
+FIRST, CLUSTER, CHAIN, CELL, NEXT, LEVEL = 0, 1, 2, 3, 4, 5
+BLOCK_COLUMNS = 6
+
+# Columns of Flight.cells after the numbers of cells, which take d: the first place in head, and 1
+# if there are more than two cells along each axis.
+OFFSET, FORWARD = 0, 1
+# Columns of Flight.scale after the cells in a unit of length: the largest diameter, and half the
+# largest extension of the centres of a block.
+WIDEST, EXTENT = 0, 1
 
 # A bit of Flight.head.
 MIXED = np.int32(1 << 30)
@@ -102,14 +110,17 @@ class Flight(NamedTuple):
     Attributes
     ----------
     clock, count : of shape (CLOCKS,), (COUNTS,)
-    length, period, cells, scale : of shape (d,)
-        The box, and the number of cells along each axis and in a unit of length.
+    length, period : of shape (d,)
+        The box.
+    cells, scale : of shape (L, d + 2)
+        A grid for each level of radii: the cells along each axis, and those in a unit of length.
     rel, radius, disc : of shape (N, d), (N,) or (1,), (N, 2)
         Discs, in the order of space.
-    block, place, half : of shape (B + 1, 5), (B, d), (B, d)
+    block, place, half : of shape (B + 1, 6), (B, d), (B, d)
         Blocks; half the extension of their centres.
     head : of shape (C,)
-        First block of each cell; with the bit MIXED, if there may be other clusters than its own.
+        First block of each cell of all grids; with the bit MIXED, if there may be other clusters
+        than its own.
     body, bound, group : of shape (G, 2 d + 4), (G, 2 d), (G, 8)
         Clusters; their lower and upper bounds, less the displacement.
     half_edge : of shape (2 P, 4)

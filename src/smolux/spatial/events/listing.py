@@ -17,16 +17,20 @@ from .flight import (
     CHECKED,
     CLUSTER,
     EDGE,
+    EXTENT,
     FIRST,
+    FORWARD,
     FREE,
     FULL,
     HEAP,
     LAST_EDGE,
+    LEVEL,
     LISTED,
     LISTED_IN,
     MASS,
     MIXED,
     NEXT,
+    OFFSET,
     PAIRS,
     SINCE,
     SKIN,
@@ -36,7 +40,7 @@ from .flight import (
     WAY,
     WIDEST,
 )
-from .geometry import larger, shift
+from .geometry import larger, shift, smaller
 from .pairs import add
 
 
@@ -65,21 +69,28 @@ def bind(d):
         body[c, 2 * d + SINCE] = t
 
     @piece
-    def cell_along(f, x, k):
-        """Cell of a coordinate along an axis."""
-        length, n = f.length[k], f.cells[k]
-        if f.period[k] > 0.0:
-            x -= length * math.floor(x / length)
-        c = np.int64(x * f.scale[k])
+    def folded(f, x, k):
+        """Wrap a coordinate into the box, along a periodic axis."""
+        length = f.length[k]
+        return x - length * math.floor(x / length) if f.period[k] > 0.0 else x
+
+    @piece
+    def within(c, n):
+        """Return a cell along an axis; what lies outside belongs to the outermost one."""
         return c if 0 <= c < n else (np.int64(0) if c < 0 else n - 1)
+
+    @piece
+    def cell_along(f, level, x, k):
+        """Cell of a coordinate along an axis."""
+        return within(np.int64(folded(f, x, k) * f.scale[level, k]), f.cells[level, k])
 
     @piece
     def cell_at(f, b, t):
         """Cell that holds the centre of a block."""
-        cell = np.int64(0)
+        level, cell = np.int64(f.block[b, LEVEL]), np.int64(0)
         for k in range(d):
-            cell = cell * f.cells[k] + cell_along(f, centre(f, b, k, t), k)
-        return cell
+            cell = cell * f.cells[level, k] + cell_along(f, level, centre(f, b, k, t), k)
+        return cell + f.cells[level, d + OFFSET]
 
     @piece
     def insert(f, b, cell):
@@ -155,15 +166,15 @@ def bind(d):
             list_discs(f, b, q, dx)
 
     @piece
-    def around(f, x, k, near):
+    def around(f, level, x, k, near):
         """Write the places of the cells around a coordinate along an axis; -1 if there is none.
 
         Along a periodic axis of one or two cells, neighbours on both sides are the same cell.
         """
-        n, stride = f.cells[k], 1
+        n, stride = f.cells[level, k], 1
         for m in range(k + 1, d):
-            stride *= f.cells[m]
-        at = cell_along(f, x, k)
+            stride *= f.cells[level, m]
+        at = cell_along(f, level, x, k)
         wraps = f.period[k] > 0.0
         near[k, 1] = at * stride
         below, above = at - 1, at + 1
@@ -178,23 +189,76 @@ def bind(d):
         near[k, 2] = above * stride if above >= 0 else -1
 
     @piece
-    def search(f, b, t, batch, forward, work, near):
+    def look_into(f, b, cell, start, t, batch, forward, x, dx, reach):
+        """List pairs of a block with those of a cell, from one of them on if `start` is not -1."""
+        block, head = f.block, f.head
+        own, still = block[b, CLUSTER], batch == 0
+        q = head[cell]
+        if q < 0:
+            return
+        mixed = q & MIXED
+        q ^= mixed
+        if mixed == 0 and block[q, CLUSTER] == own:
+            return
+        alone, checked = start < 0, 0
+        if start >= 0:
+            q = block[start, NEXT]
+        while q >= 0:
+            c = block[q, CLUSTER]
+            if c != own:
+                alone = False
+                if forward or (q > b if still else f.group[np.uint32(c), LISTED_IN] != batch):
+                    checked += 1
+                    look(f, b, np.uint32(q), t, still, x, dx, reach)
+            q = block[q, NEXT]
+        if alone:  # others have left, or become one with this
+            head[cell] ^= MIXED
+        f.count[CHECKED] += checked
+
+    @cold_piece
+    def look_at_level(f, b, level, t, batch, x, dx, near):
+        """List pairs of a block with those of another level."""
+        scale, cells, own = f.scale, f.cells, np.int64(f.block[b, LEVEL])
+        reach = 0.5 * (scale[own, d + WIDEST] + scale[level, d + WIDEST]) + f.clock[SKIN]
+        # it may have moved half a skin since it was binned, and lies around the centre of its block
+        far = reach + 0.5 * f.clock[SKIN] + scale[level, d + EXTENT]
+        near[2, 0], near[2, 1] = 0, 1
+        for k in range(d):
+            y, n = folded(f, x[k], k), cells[level, k]
+            low = np.int64(math.floor((y - far) * scale[level, k]))
+            high = np.int64(math.floor((y + far) * scale[level, k]))
+            if f.period[k] == 0.0:
+                low, high = within(low, n), within(high, n)
+            near[k, 0], near[k, 1] = low, smaller(high - low + 1, n)
+        for one in range(near[0, 1]):
+            first = (near[0, 0] + one) % cells[level, 0]
+            for two in range(near[1, 1]):
+                row = first * cells[level, 1] + (near[1, 0] + two) % cells[level, 1]
+                for three in range(near[2, 1]):
+                    cell = row
+                    if d == 3:
+                        cell = row * cells[level, 2] + (near[2, 0] + three) % cells[level, 2]
+                    cell += cells[level, d + OFFSET]
+                    look_into(f, b, cell, np.int64(-1), t, batch, batch == 0, x, dx, reach)
+
+    @piece
+    def search(f, b, t, batch, work, near):
         """List pairs of a block with those of other clusters, except of those listed in a batch.
 
-        If all blocks are listed, each pair is looked at from one side: `forward`, or by numbers.
+        If all blocks are listed, each pair is looked at from one side: the larger discs from the
+        smaller ones, those of a level forward, or by numbers.
         """
-        block, head = f.block, f.head
         x, dx = work[0], work[1]
-        own = block[b, CLUSTER]
-        reach = f.clock[WIDEST] + f.clock[SKIN]
-        still = batch == 0
+        level, still = np.int64(f.block[b, LEVEL]), batch == 0
+        forward = still and f.cells[level, d + FORWARD] == 1
+        reach = f.scale[level, d + WIDEST] + f.clock[SKIN]
+        offset = f.cells[level, d + OFFSET]
         for k in range(d):
             x[k] = f.place[b, k] if still else centre(f, b, k, t)
-            around(f, x[k], k, near)
-        checked = 0
+            around(f, level, x[k], k, near)
         for one in range(1 if forward else 0, 3):
             for two in range(1 if forward and one == 1 else 0, 3):
-                row = near[0, one] + near[1, two]
+                row = near[0, one] + near[1, two] + offset
                 if near[0, one] < 0 or near[1, two] < 0:
                     continue
                 middle = one == 1 and two == 1
@@ -204,31 +268,13 @@ def bind(d):
                         if near[2, three] < 0:
                             continue
                         cell += near[2, three]
-                    q = head[cell]
-                    if q < 0:
-                        continue
-                    mixed = q & MIXED
-                    q ^= mixed
-                    if mixed == 0 and block[q, CLUSTER] == own:
-                        continue
-                    whole = not (forward and middle and (d == 2 or three == 1))
-                    if not whole:
-                        q = block[b, NEXT]
-                    alone = whole
-                    while q >= 0:
-                        c = block[q, CLUSTER]
-                        if c != own:
-                            alone = False
-                            if forward or (
-                                q > b if still else f.group[np.uint32(c), LISTED_IN] != batch
-                            ):
-                                checked += 1
-                                look(f, b, np.uint32(q), t, still, x, dx, reach)
-                        q = block[q, NEXT]
-                    if alone:  # others have left, or become one with this
-                        head[cell] ^= MIXED
+                    own = forward and middle and (d == 2 or three == 1)
+                    start = np.int64(b) if own else np.int64(-1)
+                    look_into(f, b, cell, start, t, batch, forward, x, dx, reach)
+        for other in range(level + 1 if still else 0, f.cells.shape[0]):
+            if other != level:
+                look_at_level(f, b, other, t, batch, x, dx, near)
         f.count[LISTED] += 1
-        f.count[CHECKED] += checked
 
     @piece
     def fold(f, t):
@@ -253,16 +299,13 @@ def bind(d):
         `batch` zero all blocks, one after the other, else those of clusters to be listed in it.
         """
         group = f.group
-        forward = batch == 0
-        for k in range(d):
-            forward = forward and f.cells[k] > 2
         for c in range(larger(groups, 1)):
             if groups > 0:
                 if batch > 0 and group[c, LISTED_IN] != batch - 1:
                     continue
                 b = np.int64(group[c, START])
             while b != stop and f.count[FULL] == 0:
-                search(f, b, t, batch, forward, work, near)
+                search(f, b, t, batch, work, near)
                 b = b + 1 if batch == 0 else np.int64(f.block[b, CHAIN])
             if groups > 0:
                 group[c, LISTED_IN] = batch

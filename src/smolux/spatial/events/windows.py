@@ -56,6 +56,7 @@ from .flight import (
     START,
     THICKEST,
     TIME,
+    USUAL,
     WAY,
     WHAT,
     WHICH,
@@ -152,7 +153,10 @@ def bind(d):
         if listed < larger(2 * f.place.shape[0], 1000):
             return False
         often = LIST_COST * 3**d * listed
-        wide = CHECK_COST * (count[CHECKED] - count[MARK_CHECKED])
+        # how many are looked at depends on the skin as much as the cells do
+        part = 1.5 * clock[SKIN] / (1.5 * clock[SKIN] + clock[USUAL])
+        part = larger(d * part - 1.0, 0.0) / (d - 1)
+        wide = CHECK_COST * part * (count[CHECKED] - count[MARK_CHECKED])
         wide += PREDICT_COST * (count[PREDICTED] - count[MARK_PREDICTED])
         count[MARK_LISTED] = count[LISTED]
         count[MARK_CHECKED] = count[CHECKED]
