@@ -45,6 +45,7 @@ from .flight import (
     NO_PAIRS,
     PACKED,
     PAIR,
+    PAIRS,
     PREDICTED,
     REBUILT,
     RELABELLED,
@@ -162,7 +163,7 @@ def bind(d):
         count[MARK_CHECKED] = count[CHECKED]
         count[MARK_PREDICTED] = count[PREDICTED]
         skin = clock[SKIN]
-        if often > TOO_SMALL * wide:
+        if often > TOO_SMALL * wide and 2 * count[PAIRS] * STEP**d < f.half_edge.shape[0]:
             clock[SKIN] = smaller(skin * STEP, clock[THICKEST])
         elif often < TOO_LARGE * wide:
             clock[SKIN] = skin / STEP
