@@ -187,6 +187,10 @@ def make_plan(
     return plan
 
 
+#: the replicas of a group depend on how many workers there are, the choice must not
+_WORKERS = 2
+
+
 def with_method(plan: Plan) -> Plan:
     """Let the method be chosen."""
     if plan.subvolumes > 1:
@@ -221,6 +225,7 @@ def _circumstances(plan: Plan) -> Circumstances:
         initial.total,
         means,
         plan.times[-1],
+        plan.groups(_WORKERS)[0][1],
     )
 
 

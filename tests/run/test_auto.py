@@ -10,7 +10,7 @@ import runs
 
 import smolux as sx
 from smolux.assembly import rates_for
-from smolux.methods.auto import Circumstances, candidates_per_event, choose
+from smolux.methods.auto import Circumstances, choose, effort
 from smolux.weighting import Number
 
 AGGREGATION = [sx.processes.Aggregation()]
@@ -18,7 +18,7 @@ AGGREGATION = [sx.processes.Aggregation()]
 
 def estimate(kernel: Any, particles: int, end: float, processes: Any = AGGREGATION) -> float:
     rates = rates_for(sx.Model(kernel, processes), Number())
-    return candidates_per_event(Circumstances(rates, processes, particles, 1.0, (1.0, 1.0), end))
+    return effort(Circumstances(rates, processes, particles, 1.0, (1.0, 1.0), end))[0]
 
 
 def test_a_constant_kernel_is_never_rejected() -> None:
@@ -51,11 +51,13 @@ def test_the_estimate_is_near_what_a_run_needs(law: str, particles: int, end: fl
 
 
 def test_what_is_chosen_and_why_stands_in_the_result() -> None:
-    ds = sx.simulate(sx.Model(sx.kernels.Constant()), [1.0], particles=1000, replicas=2, seed=1)
+    ds = sx.simulate(
+        sx.Model(sx.kernels.Constant()), [1000.0], particles=10_000, replicas=2, seed=1
+    )
     assert ds.attrs["method"] == "acceptance-rejection"
     assert "candidates an event" in ds.attrs["method_reason"]
     given = sx.simulate(
-        sx.Model(sx.kernels.Constant()), [1.0], particles=1000, replicas=2, seed=1,
+        sx.Model(sx.kernels.Constant()), [1000.0], particles=10_000, replicas=2, seed=1,
         method="acceptance-rejection",
     )  # fmt: skip
     assert given.attrs["method_reason"] == "asked for"
@@ -70,19 +72,21 @@ def test_kernels_far_below_their_bound_are_not_left_to_rejection() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kernel", "particles", "method"),
+    ("kernel", "particles", "end", "method"),
     [
-        (sx.kernels.Additive(), 1_000, "low-rank"),
-        (sx.kernels.Additive(), 50_000, "size-class"),
-        (sx.kernels.Brownian(), 5_000, "acceptance-rejection"),  # two products
-        (sx.kernels.Constant(), 5_000, "acceptance-rejection"),  # one, but nothing is rejected
+        (sx.kernels.Additive(), 1_000, 1.0, "low-rank"),
+        (sx.kernels.Additive(), 50_000, 3.0, "size-class"),
+        (sx.kernels.Brownian(), 1_000, 1.0, "size-class"),  # two products
+        (sx.kernels.Constant(), 5_000, 300.0, "acceptance-rejection"),  # nothing is rejected
+        (sx.kernels.Constant(), 1_000, 1.0, "low-rank"),  # the start is all
     ],
 )
 def test_one_product_and_few_particles_are_for_low_rank(
-    kernel: Any, particles: int, method: str
+    kernel: Any, particles: int, end: float, method: str
 ) -> None:
     rates = rates_for(sx.Model(kernel, AGGREGATION), Number())
-    found, reason = choose(Circumstances(rates, AGGREGATION, particles, 1.0, (1.0, 1.0), 3.0))
+    run = Circumstances(rates, AGGREGATION, particles, 1.0, (1.0, 1.0), end, replicas=4)
+    found, reason = choose(run)
     assert found.name == method, reason
 
 

@@ -24,16 +24,19 @@ _PER_OCTAVE, _BEYOND = 2, 1000.0
 _CHANGE, _FIRST, _RAMP, _STEPS = 0.04, 1e-4, 1.4, 300
 #: change of the sizes in a step, as a share of the particles, below which they are steady
 _STEADY = 1e-3
+#: particles present, as a share of those at the start, with doubling
+_PRESENT = 0.72
 #: quantiles that stand for the sizes at the start
 _SHARES = (np.arange(64) + 0.5) / 64
-#: nanoseconds: a candidate of acceptance-rejection; what an event costs besides, for many
-#: particles, and what is shared by the events of few: bounds and tables
-_TRIAL, _EVENT, _FEW = 18.0, 10.0, 1.6e5
-#: the same of the size-class method, for which nearly every candidate is an event
-_CLASS_EVENT, _CLASS_FEW = 34.0, 2.5e5
+#: nanoseconds of acceptance-rejection: an event but for its candidates, a candidate, and what a
+#: group of replicas costs besides, for its start and for bounds
+_EVENT, _TRIAL, _START = 5.0, 27.0, 2.6e6
+#: of the size-class method, for which nearly every candidate is an event: an event, what tables add
+#: to it for few particles, and the start
+_CLASS_EVENT, _CLASS_FEW, _CLASS_START = 55.0, 8.0e4, 1.15e6
 #: of the low-rank method, for a kernel that is one product of factors, or the sum of such a product
 #: and its transpose; with more products it is never the best
-_PRODUCT_EVENT, _PRODUCT_FEW = 83.0, 1.9e5
+_PRODUCT_EVENT, _PRODUCT_START = 155.0, 0.85e6
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,8 @@ class Circumstances(NamedTuple):
         Mean sizes at the start, by number and by mass.
     end : float
         Last output time.
+    replicas : int
+        That share a start.
     """
 
     rates: Rates
@@ -78,6 +83,7 @@ class Circumstances(NamedTuple):
     density: float
     sizes: tuple[float, float]
     end: float
+    replicas: int = 1
 
 
 class _Grid:
@@ -169,8 +175,8 @@ class _Grid:
         return found
 
 
-def candidates_per_event(run: Circumstances) -> float:
-    """Estimate the candidates that acceptance-rejection needs for an event, up to the end.
+def effort(run: Circumstances) -> tuple[float, float]:
+    """Estimate the candidates that acceptance-rejection needs for an event, and all events.
 
     By a rough solution of the rate equations, and the largest size to be expected of so many
     particles.
@@ -179,7 +185,7 @@ def candidates_per_event(run: Circumstances) -> float:
     grid = _Grid(run.rates, run.processes, largest_of_all)
     course = grid.course(run.density, _start(*run.sizes), run.end)
     if not course:
-        return 1.0
+        return 1.0, 0.0
     densities = np.array([entry[0] for entry in course])
     above = np.cumsum(densities[:, ::-1], axis=1)[:, ::-1] / densities.sum(axis=1, keepdims=True)
     present = np.maximum((above * run.particles >= 1.0).sum(axis=1) - 1, 0)
@@ -188,8 +194,9 @@ def candidates_per_event(run: Circumstances) -> float:
     bound = run.rates.bounds(one, largest, one, largest)[1]  # in one call: proofs are dear
     with np.errstate(all="ignore"):
         candidates = np.where(met > 0.0, np.maximum(bound / average, 1.0), 0.0)
-    found = float(candidates @ met / met.sum())
-    return found if math.isfinite(found) else math.inf
+    events = float(met.sum())
+    found = float(candidates @ met) / events
+    return found if math.isfinite(found) else math.inf, _PRESENT * run.particles * events
 
 
 def unforeseen(processes: Sequence[Process]) -> tuple[Method, str] | None:
@@ -212,14 +219,15 @@ def costs(run: Circumstances) -> tuple[dict[type[Method], float], float]:
     candidates : float
         Of acceptance-rejection for an event.
     """
-    candidates = candidates_per_event(run)
+    candidates, events = effort(run)
+    together = max(run.replicas * events, 1.0)
     found: dict[type[Method], float] = {
-        AcceptanceRejection: _EVENT + _FEW / run.particles + _TRIAL * candidates,
-        SizeClass: _CLASS_EVENT + _CLASS_FEW / run.particles,
+        AcceptanceRejection: _EVENT + _TRIAL * candidates + _START / together,
+        SizeClass: _CLASS_EVENT + _CLASS_FEW / run.particles + _CLASS_START / together,
     }
     known = run.rates.majorant
     if known is not None and len(known.terms) == 1 and known.least == 1.0:
-        found[LowRank] = _PRODUCT_EVENT + _PRODUCT_FEW / run.particles
+        found[LowRank] = _PRODUCT_EVENT + _PRODUCT_START / together
     return found, candidates
 
 
