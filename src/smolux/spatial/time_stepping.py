@@ -52,7 +52,7 @@ class SteppingRun(Run):
     """A run of the time-stepping method."""
 
     def __init__(self, system: System, times: Float, settings: TimeStepping) -> None:
-        from .events import direct, relax, stepping, steps
+        from .events import direct, minimising, stepping, steps
 
         n, d = system.position.shape
         self.system, self.settings = system, settings
@@ -61,7 +61,7 @@ class SteppingRun(Run):
         self.logger = Logger(max(1 << 14, 2 * (d + 2) * n))
         self.series, self._next = empty_series(times, n, d), 0
         alpha, beta, damping, augmentation = settings.coefficients()
-        self.recipe = relax.Recipe(
+        self.recipe = minimising.Recipe(
             rigid=settings.rigid,
             smooth=settings.constraint == "smooth",
             adaptive=settings.adaptive,
@@ -73,7 +73,7 @@ class SteppingRun(Run):
             gap=settings.gap,
             iterations=settings.iterations,
         )
-        self.state, self.local = self._start(), self._scratch(relax.Local, 8 * n + 1024)
+        self.state, self.local = self._start(), self._scratch(minimising.Local, 8 * n + 1024)
         self.stride = settings.step * float(system.radius.min())
         self._work = np.empty(d)
 

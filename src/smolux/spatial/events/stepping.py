@@ -8,7 +8,7 @@ from ...core.compile import cold_piece, entry, piece
 from . import relax, steps
 from .direct import REST
 from .geometry import larger, smaller
-from .relax import FULL, PARTED, RELOAD
+from .minimising import FULL, PARTED, RELOAD
 from .steps import (
     CLUSTERS,
     CONTACTS,
