@@ -38,6 +38,18 @@ def precedes(f, t, a, u, b):
 
 
 @piece
+def put(f, k, t, what, which):
+    """Write an event at a place of the heap."""
+    f.when[k], f.event[k, WHAT], f.event[k, WHICH] = t, what, which
+
+
+@piece
+def move(f, k, to):
+    """Copy the event at a place of the heap to another one."""
+    put(f, to, f.when[k], f.event[k, WHAT], f.event[k, WHICH])
+
+
+@piece
 def sift_down(f, k, n, t, what, which):
     """Put an event into the heap at place `k` or below."""
     when, event = f.when, f.event
@@ -52,13 +64,9 @@ def sift_down(f, k, n, t, what, which):
             child = right
         if not precedes(f, when[child], event[child, WHAT], t, what):
             break
-        when[k], event[k, WHAT], event[k, WHICH] = (
-            when[child],
-            event[child, WHAT],
-            event[child, WHICH],
-        )
+        move(f, child, k)
         k = child
-    when[k], event[k, WHAT], event[k, WHICH] = t, what, which
+    put(f, k, t, what, which)
 
 
 @piece
@@ -76,11 +84,7 @@ def compact(f):
     kept = 0
     for k in range(count[HEAP]):
         if is_current(f, np.int64(event[k, WHAT]), event[k, WHICH]):
-            when[kept], event[kept, WHAT], event[kept, WHICH] = (
-                when[k],
-                event[k, WHAT],
-                event[k, WHICH],
-            )
+            move(f, k, kept)
             kept += 1
     for k in range(kept // 2 - 1, -1, -1):
         sift_down(f, k, kept, when[k], event[k, WHAT], event[k, WHICH])
@@ -104,13 +108,9 @@ def push(f, t, number, which):
         up = (k - 1) // 2
         if not precedes(f, t, what, when[up], event[up, WHAT]):
             break
-        when[k], event[k, WHAT], event[k, WHICH] = (
-            when[up],
-            event[up, WHAT],
-            event[up, WHICH],
-        )
+        move(f, up, k)
         k = up
-    when[k], event[k, WHAT], event[k, WHICH] = t, what, which
+    put(f, k, t, what, which)
 
 
 @piece
