@@ -1,7 +1,8 @@
 """Discs in a box to one cluster: processor seconds of the methods, exponents, memory.
 
 ``python benchmarks/spatial.py`` goes to 10^5 discs; with ``large`` to 10^6, in some minutes; with
-``memory`` it measures the memory of 10^5 to 10^7 discs alone, down to a tenth of the clusters.
+``memory`` it measures the memory of 10^5 to 10^7 discs alone, down to a tenth of the clusters; with
+``radii`` the cost of radii that differ widely.
 """
 
 from __future__ import annotations
@@ -125,6 +126,39 @@ def memories() -> list[str]:
     return table(["discs", "bytes a disc", "in all", "processor time", "asked for"], rows)
 
 
+def power_law(generator: np.random.Generator, n: int) -> np.ndarray:
+    """Radii from 1 to 100, with a density that falls as ``r**-2.5``."""
+    return (1 + generator.random(n) * (100**-1.5 - 1)) ** (1 / -1.5)
+
+
+def radii() -> list[str]:
+    """Table of the cost by the distribution of radii, at equal volume fraction and number."""
+    rows = []
+    kinds = (
+        ("equal", None),
+        ("lognormal, 1.3", sp.lognormal_radii(1.3)),
+        ("lognormal, 2", sp.lognormal_radii(2.0)),
+        ("power law, 1 to 100", power_law),
+    )
+    for dimension in (2, 3):
+        compiled(dimension)
+        seconds(sp.Windowed, sp.random(64, 0.1, radii=power_law, dimension=dimension, seed=1))
+        for discs in (10_000, 50_000):
+            equal = 0.0
+            for name, drawn in kinds:
+                system = sp.random(discs, 0.1, radii=drawn, dimension=dimension, seed=1)
+                cost, events = min(seconds(sp.Windowed, system) for _ in range(2))
+                equal = equal or cost
+                rows.append([
+                    f"{dimension}D", f"{discs:,}", name,
+                    f"{system.radius.max() / system.radius.min():.0f}", f"{cost:.3g} s",
+                    f"{cost / equal:.1f}", f"{events:,}",
+                ])  # fmt: skip
+                print(*rows[-1], flush=True)
+    header = ["box", "discs", "radii", "largest / smallest", "to one cluster", "/ equal radii"]
+    return table([*header, "events"], rows)
+
+
 def highest() -> int:
     """Peak of the resident memory of this process in bytes; that of `getrusage` is inherited."""
     status = Path("/proc/self/status").read_text()
@@ -153,6 +187,10 @@ def main() -> None:
             "",
         ]
         write_section("spatial-memory", "Memory of discs in a box", [*lines, *memories()])
+        return
+    if sys.argv[1:2] == ["radii"]:
+        lines = ["Random positions, volume fraction 0.1, speeds of 1, reflecting walls.", "", *radii()]
+        write_section("spatial-radii", "Radii that differ widely", lines)
         return
     large = "large" in sys.argv[1:]
     lines = [
