@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import pairwise
@@ -25,6 +26,7 @@ from .core.weights import (
     make_weight,
 )
 from .errors import InputError
+from .kernels.base import Kernel
 from .methods.base import Method, Rates
 from .model import Model
 from .processes import Aggregation, Removal, Source
@@ -197,6 +199,46 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
     return make_loop(pieces, next_event, fire)
 
 
+class _Proved:
+    """Bounds that are remembered: proofs are dear, and every group of replicas asks for the same.
+
+    Parameters
+    ----------
+    bounds : callable
+        See `smolux.kernels.base.Kernel.bounds`.
+    """
+
+    _MOST = 64
+
+    def __init__(self, bounds: Callable[..., tuple[Any, Any]]) -> None:
+        self._bounds = bounds
+        self._known: dict[bytes, tuple[Any, Any]] = {}
+
+    def __call__(self, a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any]:
+        boxes = np.stack(np.broadcast_arrays(*(np.asarray(x, float) for x in (a, b, c, d))))
+        key = hashlib.sha256(repr(boxes.shape).encode() + boxes.tobytes()).digest()
+        if key not in self._known:
+            while len(self._known) >= self._MOST:
+                self._known.pop(next(iter(self._known)), None)
+            self._known[key] = self._bounds(a, b, c, d)
+        found = self._known.get(key) or self._bounds(a, b, c, d)
+        return found[0].copy(), found[1].copy()
+
+
+@lru_cache(maxsize=16)
+def _proved(kernel: Kernel, weighting: Weighting, rate: str) -> _Proved:
+    return _Proved(weighting.bounds(kernel))
+
+
+def _bounds_of(kernel: Kernel, weighting: Weighting) -> Callable[..., tuple[Any, Any]]:
+    try:
+        if kernel.fixed and weighting.fixed:
+            return _proved(kernel, weighting, digest(kernel.rate))
+    except TypeError:  # parameters that have no hash
+        pass
+    return weighting.bounds(kernel)
+
+
 def rates_for(model: Model, weighting: Weighting) -> Rates:
     """Return what a method needs to know of the simulated rate."""
     kernel = model.kernel
@@ -204,7 +246,7 @@ def rates_for(model: Model, weighting: Weighting) -> Rates:
     return Rates(
         (*kernel.parameters, *weighting.parameters),
         weighting.arrays(kernel),
-        weighting.bounds(kernel),
+        _bounds_of(kernel, weighting),
         kernel.cheap and weighting.cheap,
         kernel.rigorous and weighting.rigorous,
         weighting.majorant(kernel),

@@ -178,10 +178,11 @@ class Group:
         waiting = np.flatnonzero(
             (self.codes != DONE) & (self.codes != BUDGET) & (self.codes != GROW)
         )
+        if len(waiting):
+            rates = rates_for(self.plan.model, self.plan.weighting)
         for r in map(int, waiting):
             code = self.codes[r]
             if code == BOUND:
-                rates = rates_for(self.plan.model, self.plan.weighting)
                 self.plan.method.supply_bound(self.work, rates, self.state, r)
             elif code == PAUSED:
                 self.distribution[r].append(self.plan.method.population(self.work, self.state, r))
