@@ -189,8 +189,8 @@ def main() -> None:
         write_section("spatial-memory", "Memory of discs in a box", [*lines, *memories()])
         return
     if sys.argv[1:2] == ["radii"]:
-        lines = ["Random positions, volume fraction 0.1, speeds of 1, reflecting walls.", "", *radii()]
-        write_section("spatial-radii", "Radii that differ widely", lines)
+        lines = ["Random positions, volume fraction 0.1, speeds of 1, reflecting walls.", ""]
+        write_section("spatial-radii", "Radii that differ widely", [*lines, *radii()])
         return
     large = "large" in sys.argv[1:]
     lines = [
