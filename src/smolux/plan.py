@@ -22,7 +22,7 @@ from .methods import METHODS, AcceptanceRejection, SizeClass
 from .methods.auto import Auto, Circumstances, choose, costs, unforeseen
 from .methods.base import Method
 from .model import Model
-from .population import POPULATIONS
+from .population import POPULATIONS, doubles_at
 from .processes.base import PairProcess
 from .weighting import WEIGHTINGS
 from .weighting.auto import Auto as AutoWeighting
@@ -226,6 +226,7 @@ def _circumstances(plan: Plan) -> Circumstances:
         means,
         plan.times[-1],
         plan.groups(_WORKERS)[0][1],
+        doubles_at(plan.population, plan.particles) > 0,
     )
 
 

@@ -46,8 +46,8 @@ def test_help_names_every_command():
 
 
 def test_a_misspelt_command_is_a_mistake_of_the_user():
-    result = call("rnu", "x", code=2)
-    assert "Traceback" not in result.stderr
+    for wrong in (("rnu", "x"), ("run",)):
+        assert "Traceback" not in call(*wrong, code=2).stderr
 
 
 # --- kernels ---------------------------------------------------------------------------------

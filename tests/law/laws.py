@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import integrate, stats
 
 import smolux as sx
+from shared import FORMULA
 from smolux import exact
 from smolux.kernels.base import Kernel
 
@@ -28,7 +29,6 @@ COEFFICIENTS = {
     "bilinear": (1.0, 0.5, 0.25, 0.0),
     "ballistic": (0.0, 0.0, 0.0, 1.0),
 }
-FORMULA = "c0 + c1*(i + j) + c2*i*j + c3*(cbrt(i) + cbrt(j))**2*sqrt(1/i + 1/j)"
 #: the same laws by the names under which their solutions are known
 KNOWN: dict[str, Kernel] = {
     "constant": sx.kernels.Constant(),
@@ -222,7 +222,7 @@ def fluctuations(method: Any, law: str, seed: int = 6) -> None:
     The exact standard deviations are 37 and 50. Programs that add mean waiting times get less than
     one, with the right mean.
     """
-    particles, replicas, t = 10_000, 600, 0.6
+    particles, replicas, t = 10_000, 200, 0.6
     ds = finite(law, [t], method, particles=particles, replicas=replicas, sizes=16, seed=seed)
     number = ds["particles"].values[:, 0]
     mean, variance = exact.finite.law(law, particles).number_moments(t)

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import smolux as sx
+from shared import QUICK as QUICK_METHODS
+from shared import VARYING
 
 DATA = Path(__file__).parent.parent / "reference" / "data"
 METHODS = [method.name for method in sx.methods.METHODS]
@@ -34,9 +36,13 @@ def test_whole_distribution(method: str, law: str, shattering: float) -> None:
     laws.whole_distribution(method, law, shattering)
 
 
-@every_method
+@pytest.mark.parametrize(
+    "method",
+    [pytest.param(m, marks=() if m in QUICK_METHODS else pytest.mark.slow) for m in METHODS],
+)
 def test_distribution_with_a_rate_that_depends_on_time(method: str) -> None:
-    laws.distribution_in_time(method, "0.4 * (1 + sin(5 * t))", lambda t: 0.4 * (1 + np.sin(5 * t)))
+    """Thinning is the loop's; what the methods know of time is when a draw begins."""
+    laws.distribution_in_time(method, VARYING, lambda t: 0.4 * (1 + np.sin(5 * t)))
 
 
 @every_method
@@ -93,7 +99,8 @@ def test_mass(method: str, law: str, population: str) -> None:
     laws.mass(method, law, population)
 
 
-@pytest.mark.parametrize("law", [pytest.param("additive", marks=pytest.mark.slow), "ballistic"])
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["additive", "ballistic"])
 def test_methods_agree(law: str) -> None:
     laws.agreement(METHODS, law)
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import laws
 import numpy as np
@@ -14,7 +13,7 @@ import smolux as sx
 from smolux import exact
 from smolux.core.state import TRIALS
 from smolux.kernels import Kernel, Majorant
-from smolux.kernels.base import corners
+from smolux.kernels.formula_kernel import FormulaKernel
 from smolux.plan import make_plan
 from smolux.replicas import Group
 
@@ -22,27 +21,23 @@ from smolux.replicas import Group
 WIDE = sx.methods.LowRank(bits=0)
 
 
-def _rate(i: Any, j: Any, scale: Any) -> Any:
-    return scale * (1.0 + (i - j) * (i - j))
+#: ``1 + i**2 + j**2 - i j``, never below ``i + j``: of rank three, with a factor below zero
+SIGNED = Majorant(((0.5, 0.0, 0.0), (0.5, 2.0, 0.0), (0.5, 0.0, 2.0), (-0.5, 1.0, 1.0)))
 
 
 @dataclass(frozen=True)
-class Difference(Kernel):
-    """``1 + (i - j)^2``: of rank three, with a factor below zero."""
+class Given(FormulaKernel):
+    """A law with the loop of all laws and a majorant of its own."""
 
-    scale: float = 1.0
-    name: ClassVar[str] = "difference"
-    formula: ClassVar[str] = "scale * (1 + (i - j)**2)"
-    rate: ClassVar[Callable[..., Any]] = staticmethod(_rate)
+    known: Majorant | None = None
 
-    def bounds(self, a: Any, b: Any, c: Any, d: Any) -> Any:
-        gap = np.maximum(np.abs(np.subtract(b, c)), np.abs(np.subtract(d, a)))
-        return corners(self, (np.ones_like(gap), np.ones_like(gap)), (gap + 1.0, 1.0 + 0 * gap))
+    def majorant(self) -> Majorant | None:
+        return self.known
 
-    def majorant(self) -> Majorant:
-        half = 0.5 * self.scale
-        terms = ((half, 0, 0), (half, 2, 0), (half, 0, 2), (-2 * half, 1, 1))
-        return Majorant(tuple((w, float(p), float(q)) for w, p, q in terms), least=1.0)
+
+def given(law: str, majorant: Majorant | None) -> Given:
+    kernel = laws.kernel(law)
+    return Given(kernel.expression, kernel.names, kernel.values, known=majorant)
 
 
 def partitions(model: sx.Model, method: Any, times: tuple[float, ...], shattering: float) -> None:
@@ -61,10 +56,10 @@ def partitions(model: sx.Model, method: Any, times: tuple[float, ...], shatterin
 @pytest.mark.parametrize("method", [sx.methods.LowRank(), WIDE])
 def test_factors_of_mixed_sign(method: Any) -> None:
     processes = [sx.processes.Aggregation(), sx.processes.Shattering(0.1)]
-    partitions(sx.Model(Difference(), processes), method, (0.3, 1.0), 0.1)
+    partitions(sx.Model(given("additive", SIGNED), processes), method, (0.3, 1.0), 0.1)
 
 
-@pytest.mark.parametrize("law", ["additive", "ballistic"])
+@pytest.mark.parametrize("law", [pytest.param("additive", marks=pytest.mark.slow), "ballistic"])
 def test_wide_slots(law: str) -> None:
     laws.whole_distribution(WIDE, law, 0.1)
     laws.mass(WIDE, law, "doubling")
@@ -105,14 +100,19 @@ def test_a_replica_does_not_depend_on_the_others(kernel: Kernel, method: Any) ->
             np.testing.assert_array_equal(a[0], b[r])
 
 
-def test_few_candidates_are_rejected() -> None:
-    for kernel, most in (
-        (sx.kernels.Brownian(), 1.02),
-        (sx.kernels.Ballistic(), 1.42),
-    ):
-        group = _group(kernel, "low-rank", 2000, 2.0)
-        group.advance(lambda: False)
-        assert group.state.count[0, TRIALS] < most * group.events
+@pytest.mark.parametrize(
+    ("kernel", "most"),
+    [
+        pytest.param(sx.kernels.Brownian(), 1.02, marks=pytest.mark.slow),
+        pytest.param(sx.kernels.Ballistic(), 1.42, marks=pytest.mark.slow),
+        (given("ballistic", sx.kernels.Ballistic().majorant()), 1.42),
+    ],
+    ids=repr,
+)
+def test_few_candidates_are_rejected(kernel: Kernel, most: float) -> None:
+    group = _group(kernel, "low-rank", 2000, 2.0)
+    group.advance(lambda: False)
+    assert group.state.count[0, TRIALS] < most * group.events
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import smolux as sx
+from shared import QUICK
 from smolux.assembly import rates_for
 from smolux.errors import InputError
 
@@ -35,8 +36,6 @@ def model(
     return sx.Model(laws.kernel(law), processes, initial or sx.initial.monodisperse())
 
 
-#: loops of the others compile long
-QUICK = ("size-class", "acceptance-rejection")
 every_method = pytest.mark.parametrize(
     "method",
     [pytest.param(m, marks=() if m in QUICK else pytest.mark.slow) for m in METHODS],

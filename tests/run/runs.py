@@ -5,15 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 import smolux as sx
+from shared import FORMULA, QUICK, VARYING
 from smolux.plan import Plan, make_plan
 
 METHODS = [method.name for method in sx.methods.METHODS]
-#: shared with the law tests
-FORMULA = "c0 + c1*(i + j) + c2*i*j + c3*(cbrt(i) + cbrt(j))**2*sqrt(1/i + 1/j)"
-#: a rate that varies in time, as formulas do it; shared with the law tests
-VARYING = "0.4 * (1 + sin(5 * t))"
+#: the method, and whether the rate varies: its loop is another one
+every_rate = pytest.mark.parametrize(
+    ("method", "rate"),
+    [
+        pytest.param(method, rate, marks=pytest.mark.slow if slow else ())
+        for method in METHODS
+        for rate, slow in ((0.1, False), (VARYING, method not in QUICK))
+    ],
+)
 
 
 def model(rate: Any = 0.1, initial: Any = None, c0: float = 1.0, c1: float = 0.5) -> sx.Model:

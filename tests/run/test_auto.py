@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import runs
 
 import smolux as sx
+from shared import FORMULA
 from smolux.assembly import rates_for
 from smolux.methods.auto import Circumstances, choose, effort
 from smolux.weighting import Number
@@ -35,7 +35,7 @@ def test_the_estimate_is_near_what_a_run_needs(law: str, particles: int, end: fl
 
     given = {"c0": 0.0, "c1": 0.0, "c2": 0.0, "c3": 0.0}
     kernel = sx.kernels.formula(
-        runs.FORMULA, **given | {"additive": {"c1": 1.0}, "ballistic": {"c3": 1.0}}[law]
+        FORMULA, **given | {"additive": {"c1": 1.0}, "ballistic": {"c3": 1.0}}[law]
     )
     processes = [sx.processes.Aggregation(), sx.processes.Shattering(0.0)]
     plan = make_plan(

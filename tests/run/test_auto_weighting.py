@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import runs
 
 import smolux as sx
+from shared import FORMULA
 from smolux import case as cases
 from smolux import checkpoint, pilot
 from smolux.cli import running
@@ -20,7 +20,7 @@ from smolux.errors import InputError
 from smolux.plan import Plan, event_cost, make_plan
 
 METHOD = "acceptance-rejection"
-KERNEL = sx.kernels.formula(runs.FORMULA, c0=1.0, c1=0.0, c2=0.0, c3=0.0)
+KERNEL = sx.kernels.formula(FORMULA, c0=1.0, c1=0.0, c2=0.0, c3=0.0)
 
 
 @pytest.fixture(autouse=True)

@@ -13,11 +13,11 @@ import pytest
 import runs
 
 import smolux as sx
+from shared import VARYING
 from smolux import checkpoint as checkpoints
 from smolux import replicas
 from smolux.errors import InputError, Interrupted
 
-every_method = pytest.mark.parametrize("method", runs.METHODS)
 TIMES = [0.0, 0.3, 1.0, 2.0]
 SETTINGS: dict[str, Any] = {"particles": 2000, "replicas": 3, "seed": 5, "sizes": 40}
 
@@ -28,7 +28,7 @@ def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "run.npz"
 
 
-def simulate(method: str = runs.METHODS[0], rate: Any = runs.VARYING, **settings: Any) -> Any:
+def simulate(method: str = runs.METHODS[0], rate: Any = VARYING, **settings: Any) -> Any:
     return sx.simulate(runs.model(rate), TIMES, method=method, **SETTINGS | settings)
 
 
@@ -49,10 +49,10 @@ def go_on(path: Path, most: int = 10_000, **settings: Any) -> tuple[Any, int]:
 
 
 @pytest.mark.parametrize("distribution", [False, True])
-@every_method
-def test_stopped_again_and_again(method: str, distribution: bool, path: Path) -> None:
-    expected = simulate(method, distribution=distribution)
-    stop = stopped(path, method, distribution=distribution)
+@runs.every_rate
+def test_stopped_again_and_again(method: str, rate: Any, distribution: bool, path: Path) -> None:
+    expected = simulate(method, rate, distribution=distribution)
+    stop = stopped(path, method, rate=rate, distribution=distribution)
     assert "time limit" in str(stop)
     assert str(path) in str(stop)
     assert stop.checkpoint == path

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import runs
 
 import smolux as sx
+from shared import FORMULA
 from smolux.ensembles import Moments
 from smolux.ensembles.batches import Sampler, make_sampler
 from smolux.errors import InputError
@@ -86,7 +86,7 @@ def test_the_replicas_are_those_of_simulate(q: float):
 
 def test_a_run_whose_stores_grow_leaves_no_wrong_tables():
     """With the loop of the law tests; the first run learns tables for twice as many slots."""
-    kernel = sx.kernels.formula(runs.FORMULA, c0=0.0, c1=1.0, c2=0.0, c3=0.0)
+    kernel = sx.kernels.formula(FORMULA, c0=0.0, c1=1.0, c2=0.0, c3=0.0)
     model = sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(0.0)])
     settings: dict[str, Any] = {"method": "low-rank", "population": "none", "particles": 60}
     settings |= {"replicas": 100, "seed": 3}

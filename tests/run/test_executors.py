@@ -179,7 +179,7 @@ def test_what_is_missing_is_told_with_how_to_install_it(
 # --- Dask ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("processes", [False, True])
+@pytest.mark.parametrize("processes", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_dask(processes: bool, expected: Any) -> None:
     distributed = pytest.importorskip("distributed")
     seen: list[Any] = []

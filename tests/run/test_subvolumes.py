@@ -12,6 +12,7 @@ import pytest
 import runs
 
 import smolux as sx
+from shared import VARYING
 from smolux import plan, subvolumes
 from smolux.errors import InputError, Interrupted
 from smolux.exact import finite
@@ -22,7 +23,7 @@ TIMES = [0.0, 0.5, 2.0]
 
 def simulate(method: str = "size-class", times: Any = TIMES, **settings: Any) -> Any:
     given = {"subvolumes": 2, "remix": 0.3} | settings
-    return sx.simulate(runs.model(runs.VARYING), times, method=method, **SETTINGS | given)
+    return sx.simulate(runs.model(VARYING), times, method=method, **SETTINGS | given)
 
 
 @pytest.mark.parametrize("method", ["size-class", "acceptance-rejection"])  # their own, and any

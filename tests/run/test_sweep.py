@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import runs
 
 import smolux as sx
+from shared import FORMULA
 from smolux.errors import InputError, Interrupted
 from smolux.sweeps import Folder, grid, read_axes
 from smolux.sweeps.points import derived
@@ -19,7 +19,7 @@ from smolux.sweeps.points import derived
 CASE = f"""\
 title = "grid"
 [kernel]
-formula = "{runs.FORMULA}"
+formula = "{FORMULA}"
 c0 = 1.0
 c1 = 0.5
 c2 = 0.0
@@ -115,7 +115,10 @@ def test_mistakes_in_the_case_come_before_anything_is_computed(case: Path, tmp_p
     with pytest.raises(InputError, match="time_limit"):
         sx.sweep(case, ["kernel.c1=1"], sets=["run.time_limit=9"], directory=tmp_path / "s")
     with pytest.raises(InputError, match=r"lower run\.sizes"):
-        sx.sweep(case, ["kernel.c1=0:1:300"], sets=["run.sizes=1e7"], directory=tmp_path / "s")
+        sx.sweep(
+            case, ["kernel.c1=0:1:20"], sets=["run.sizes=1e7", "run.replicas=200"],
+            directory=tmp_path / "s",
+        )  # fmt: skip
     assert not (tmp_path / "s").exists()
 
 
@@ -141,7 +144,7 @@ def test_a_dimension_for_each_key(expected: Any) -> None:
 def test_each_point_is_the_run_of_its_case(expected: Any) -> None:
     place = {"kernel.c1": 0.25, "processes.shattering.rate": 0.3}
     point = expected.sel(place)
-    kernel = sx.kernels.formula(runs.FORMULA, c0=1.0, c1=0.25, c2=0.0, c3=0.0)
+    kernel = sx.kernels.formula(FORMULA, c0=1.0, c1=0.25, c2=0.0, c3=0.0)
     ds = sx.simulate(
         sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(0.3)]), [0.5, 1],
         particles=150, replicas=3, sizes=32, method="acceptance-rejection",

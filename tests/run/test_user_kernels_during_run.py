@@ -13,14 +13,13 @@ import pytest
 import runs
 
 import smolux as sx
+from shared import QUICK
 from smolux import assembly
 from smolux.core.state import REPAIRS
 from smolux.errors import InputError
 from smolux.replicas import Group
 from smolux.timefunction import TimeFunction
 
-#: loops of the others compile long
-QUICK = ("size-class", "acceptance-rejection")
 every_method = pytest.mark.parametrize(
     "method",
     [pytest.param(m, marks=() if m in QUICK else pytest.mark.slow) for m in runs.METHODS],

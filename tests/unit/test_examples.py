@@ -23,7 +23,7 @@ GUIDES = [
     if "```python" in page.read_text(encoding="utf-8")
 ]
 #: these compile more loops than others
-LONG = ("choose-a-method", "efficiency", "many-cores", "units", "your-own-kernel")
+LONG = ("choose-a-method", "efficiency", "many-cores", "resume", "units", "your-own-kernel")
 
 
 @pytest.fixture
@@ -97,6 +97,7 @@ def test_readme_example(small, tmp_path):
     check(small, tmp_path)
 
 
+@pytest.mark.slow
 def test_readme_case_file(small):
     (text,) = blocks(README, "toml")
     case = parse(text)

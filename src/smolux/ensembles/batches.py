@@ -175,7 +175,8 @@ def make_sampler(
         problems.append(f"replicas = {replicas!r}: must be a whole number of at least 2")
     try:
         plan = make_plan(
-            model, times, method, weighting, population, particles, 1, seed, orders,
+            model, times, method, weighting, population, particles, min(number or 1, _TOGETHER),
+            seed, orders,
             min(max(sizes, min(_SIZES, whole(particles) or 1)), _LARGEST), 1, False,
             target=names[0] if names and not problems else "number_density",
         )  # fmt: skip

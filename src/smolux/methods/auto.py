@@ -28,9 +28,9 @@ _STEADY = 1e-3
 _PRESENT = 0.72
 #: quantiles that stand for the sizes at the start
 _SHARES = (np.arange(64) + 0.5) / 64
-#: nanoseconds of acceptance-rejection: an event but for its candidates, a candidate, and what a
-#: group of replicas costs besides, for its start and for bounds
-_EVENT, _TRIAL, _START = 5.0, 27.0, 2.6e6
+#: nanoseconds of acceptance-rejection: an event but for its candidates, a candidate by whether its
+#: rate is read or computed, and what a group of replicas costs besides, for its start and bounds
+_EVENT, _TRIAL, _CHEAP_TRIAL, _START = 5.0, 27.0, 20.0, 2.6e6
 #: of the size-class method, for which nearly every candidate is an event: an event, what tables add
 #: to it for few particles, and the start
 _CLASS_EVENT, _CLASS_FEW, _CLASS_START = 55.0, 8.0e4, 1.15e6
@@ -75,6 +75,8 @@ class Circumstances(NamedTuple):
         Last output time.
     replicas : int
         That share a start.
+    doubles : bool
+        Whether the volume is doubled when few particles are left.
     """
 
     rates: Rates
@@ -84,6 +86,7 @@ class Circumstances(NamedTuple):
     sizes: tuple[float, float]
     end: float
     replicas: int = 1
+    doubles: bool = True
 
 
 class _Grid:
@@ -187,16 +190,22 @@ def effort(run: Circumstances) -> tuple[float, float]:
     if not course:
         return 1.0, 0.0
     densities = np.array([entry[0] for entry in course])
-    above = np.cumsum(densities[:, ::-1], axis=1)[:, ::-1] / densities.sum(axis=1, keepdims=True)
-    present = np.maximum((above * run.particles >= 1.0).sum(axis=1) - 1, 0)
+    total = densities.sum(axis=1)
+    # few are left in a fixed volume, and none of them is larger than all
+    number = run.particles * (np.full(len(course), _PRESENT) if run.doubles else total / total[0])
+    above = np.cumsum(densities[:, ::-1], axis=1)[:, ::-1] / total[:, None]
+    present = np.maximum((above * number[:, None] >= 1.0).sum(axis=1) - 1, 0)
     largest, one = grid.size[present], np.ones(len(course))
     average, met = np.array([entry[1:] for entry in course]).T
+    if not run.doubles:
+        largest = np.minimum(largest, max(run.particles * run.sizes[0], 1.0))
+        met = np.where(number >= 2.0, met, 0.0)
     bound = run.rates.bounds(one, largest, one, largest)[1]  # in one call: proofs are dear
     with np.errstate(all="ignore"):
         candidates = np.where(met > 0.0, np.maximum(bound / average, 1.0), 0.0)
-    events = float(met.sum())
-    found = float(candidates @ met) / events
-    return found if math.isfinite(found) else math.inf, _PRESENT * run.particles * events
+    events = float(met @ number)
+    found = float(candidates @ (met * number)) / events if events > 0.0 else 1.0
+    return found if math.isfinite(found) else math.inf, events
 
 
 def unforeseen(processes: Sequence[Process]) -> tuple[Method, str] | None:
@@ -221,8 +230,9 @@ def costs(run: Circumstances) -> tuple[dict[type[Method], float], float]:
     """
     candidates, events = effort(run)
     together = max(run.replicas * events, 1.0)
+    trial = _CHEAP_TRIAL if run.rates.cheap else _TRIAL
     found: dict[type[Method], float] = {
-        AcceptanceRejection: _EVENT + _TRIAL * candidates + _START / together,
+        AcceptanceRejection: _EVENT + trial * candidates + _START / together,
         SizeClass: _CLASS_EVENT + _CLASS_FEW / run.particles + _CLASS_START / together,
     }
     known = run.rates.majorant
