@@ -25,7 +25,7 @@ name = "aggregation"
 name = "shattering"
 rate = 0.1
 [run]
-times = [0, 10, 30, 60]
+times = [0, 10, 50, 150]
 particles = 300000
 replicas = 3
 checkpoint_every = 0.2

@@ -121,12 +121,12 @@ def test_progress_is_shown_toward_it() -> None:
 
 
 def test_stopped_again_and_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = simulate(particles=1000, target_error=0.03)
+    expected = simulate(particles=1000, target_error=0.04)
     assert expected.sizes["replica"] > 8
     monkeypatch.setattr(replicas, "_SLICE", 1e-9)
     path = tmp_path / "run.npz"
     with pytest.raises(Interrupted):
-        simulate(particles=1000, target_error=0.03, checkpoint=path, time_limit=1e-9)
+        simulate(particles=1000, target_error=0.04, checkpoint=path, time_limit=1e-9)
     seen = set()
     for _ in range(10_000):
         try:
