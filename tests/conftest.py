@@ -1,8 +1,8 @@
 """The suite runs on all cores, and its workers share what they compile.
 
-Compiling a loop takes seconds. So workers take stretches of tests, in which those that need the
-same loops follow each other, and what takes longest comes first. A run of files or single tests
-stays in one process, and so does everything without pytest-xdist or with ``-n 0``.
+Compiling a loop takes seconds. So tests that need the same loops are a group, which one worker
+takes as a whole, and what takes longest comes first. A run of files or single tests stays in one
+process, and so does everything without pytest-xdist or with ``-n 0``.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 import shutil
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,9 +21,28 @@ for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
 
 #: more workers than this find nothing to do
 _MOST_WORKERS = 8
-#: files that take long, beside the tests of methods; they come next
-_LONG = ("cli/test_process.py", "core/test_compile_cache.py", "cli/test_commands.py")
-_TESTS = Path(__file__).parent
+#: tests of a method share its loops, and two methods share theirs
+_METHODS = {
+    "fictitious-jumps": "low-rank",
+    "low-rank": "low-rank",
+    "size-class": "size-class",
+    "acceptance-rejection": "acceptance-rejection",
+    "inverse": "inverse",
+}
+#: so do tests in these folders and files; any other file is a group of its own
+_TOGETHER = {
+    "spatial/test_time_stepping.py": "spatial/test_time_stepping.py",
+    "spatial/": "spatial",
+    "cli/test_spatial_command.py": "spatial",
+    "cli/test_process.py": "cli/test_process.py",
+    "cli/": "cli",
+}
+#: groups that take long, the longest first
+_LONG = (
+    "spatial", "low-rank", "acceptance-rejection", "size-class", "cli", "inverse",
+    "cli/test_process.py", "run/test_sweep.py", "run/test_executors.py", "unit/test_plotting.py",
+    "law/test_processes.py", "spatial/test_time_stepping.py", "core/test_compile_cache.py",
+)  # fmt: skip
 _made = pytest.StashKey[str]()
 
 
@@ -37,7 +57,8 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
         option.numprocesses = "logical"
         option.maxprocesses = option.maxprocesses or _MOST_WORKERS
     if option.numprocesses and option.dist == "no":
-        option.dist = "worksteal"
+        option.dist = "loadscope"
+        option.loadscopereorder = False
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -53,20 +74,32 @@ def pytest_unconfigure(config: pytest.Config) -> None:
         shutil.rmtree(config.stash[_made], ignore_errors=True)
 
 
+def group(nodeid: str) -> str:
+    """Name the group of a test."""
+    file, _, test = nodeid.removeprefix("tests/").partition("::")
+    if file.startswith(("law/", "run/")):
+        for method, name in _METHODS.items():
+            if method in test.partition("[")[2]:
+                return name
+    return next((name for start, name in _TOGETHER.items() if file.startswith(start)), file)
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Put what takes long first, and tests of methods with the same loops one after the other."""
-    if not hasattr(config, "workerinput"):
-        return
-    from smolux.methods import METHODS
+    """Put what takes long first."""
+    if hasattr(config, "workerinput"):
+        place = {name: k for k, name in enumerate(_LONG)}
+        items.sort(key=lambda item: place.get(group(item.nodeid), len(place)))
 
-    pieces = [method.bind.__qualname__ for method in METHODS]
-    place = {method.name: pieces.index(p) for method, p in zip(METHODS, pieces, strict=True)}
-    files = {file: len(pieces) + k for k, file in enumerate(_LONG)}
 
-    def rank(item: pytest.Item) -> int:
-        method = item.callspec.params.get("method") if hasattr(item, "callspec") else None
-        file = item.path.relative_to(_TESTS).as_posix()
-        last = files.get(file, len(pieces) + len(_LONG))
-        return place.get(getattr(method, "name", str(method)), last)
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Hand out whole groups."""
+    if config.option.dist != "loadscope":
+        return None
+    from xdist.scheduler import LoadScopeScheduling
 
-    items.sort(key=rank)
+    class Groups(LoadScopeScheduling):  # type: ignore[misc]
+        def _split_scope(self, nodeid: str) -> str:
+            return group(nodeid)
+
+    return Groups(config, log)

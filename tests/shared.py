@@ -4,6 +4,15 @@ from __future__ import annotations
 
 #: kernel of the tests of laws and of runs: 1, i + j, i j and the ballistic one by its coefficients
 FORMULA = "c0 + c1*(i + j) + c2*i*j + c3*(cbrt(i) + cbrt(j))**2*sqrt(1/i + 1/j)"
+#: the constant kernel by this formula, in a case file
+KERNEL = f"""\
+[kernel]
+formula = "{FORMULA}"
+c0 = 1.0
+c1 = 0.0
+c2 = 0.0
+c3 = 0.0
+"""
 #: a rate that varies in time, as formulas do it
 VARYING = "0.4 * (1 + sin(5 * t))"
 #: methods whose loops compile fast; with the others, what does not depend on the method is slow

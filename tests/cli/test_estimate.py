@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import smolux
+from shared import KERNEL
 from smolux.case import parse
 from smolux.cli import checking, estimate
 from smolux.errors import InputError
@@ -72,7 +73,7 @@ def test_rates_that_fall_below_zero_are_found_before_the_run():
 def test_the_number_of_collisions_is_about_right(population):
     rest = '[[processes]]\nname = "aggregation"\n[[processes]]\nname = "shattering"\nrate = 0.1\n'
     given = case(
-        'name = "constant"',
+        KERNEL.partition("\n")[2],
         f'times = [30]\nparticles = 40000\nreplicas = 2\npopulation = "{population}"',
         rest,
     )

@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 from command import call
 
+from shared import KERNEL
 from smolux import results
 
 HEAVY = ("numba", "xarray", "matplotlib", "scipy", "pint", "pandas", "rich", "numpy")
 
-LONG = """\
-[kernel]
-name = "constant"
+LONG = f"""\
+{KERNEL}\
 [[processes]]
 name = "aggregation"
 [[processes]]
@@ -68,7 +68,7 @@ def test_help_loads_nothing_heavy_and_answers_at_once():
 
 
 def test_mistakes_end_with_2_and_no_traceback(tmp_path):
-    (tmp_path / "bad.toml").write_text(LONG.replace("constant", "konstant"))
+    (tmp_path / "bad.toml").write_text('[kernel]\nname = "konstant"\n[run]\ntimes = [1]\n')
     code, out, err = finish(start("run", "bad.toml", cwd=tmp_path))
     assert (code, out) == (2, "")
     (line,) = err.splitlines()

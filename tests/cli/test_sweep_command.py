@@ -13,11 +13,11 @@ import pytest
 from command import call
 
 import smolux
+from shared import KERNEL
 from smolux import results
 
-CASE = """\
-[kernel]
-name = "constant"
+CASE = f"""\
+{KERNEL}\
 [[processes]]
 name = "aggregation"
 [[processes]]
@@ -87,9 +87,9 @@ def test_a_table_and_what_failed(folder):
 
 
 def test_mistakes(folder):
-    result = call("sweep", "c.toml", "--over", "kernel.scal=1,2", code=2)
+    result = call("sweep", "c.toml", "--over", "run.seeed=1,2", code=2)
     assert "no such key" in result.stderr
-    assert "did you mean 'scale'" in result.stderr
+    assert "did you mean 'seed'" in result.stderr
     assert "nothing to sweep over" in call("sweep", "c.toml", code=2).stderr
     assert "cannot be read" in call("sweep", "none.toml", "--over", "a.b=1", code=2).stderr
     (folder / "empty").mkdir()
