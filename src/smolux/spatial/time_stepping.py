@@ -28,6 +28,7 @@ _COEFFICIENTS = {
     ("plain", "smooth"): (0.15, 0.3, 2.0, 0.0),
 }
 _FORMS, _CONSTRAINTS = ("augmented", "damped", "plain"), ("non-smooth", "smooth")
+_NEW_LINKS = ("balanced", "slack")
 _NAMES = ("alpha", "beta", "damping", "augmentation")
 #: the relative way of two discs in a step must stay below a radius
 _LONGEST_STEP = 0.5
@@ -72,6 +73,7 @@ class SteppingRun(Run):
             overlap=settings.overlap,
             gap=settings.gap,
             iterations=settings.iterations,
+            first=1.0 if settings.new_links == "balanced" else 0.0,
         )
         self.state, self.local = self._start(), self._scratch(minimising.Local, 8 * n + 1024)
         self.stride = settings.step * float(system.radius.min())
@@ -226,6 +228,10 @@ class TimeStepping(SpatialMethod):
     alpha, beta, damping, augmentation : float, optional
         Coefficients of positions, of multipliers, of the damping and of the penalty, instead of
         those of the form and the constraint; in units of the sum of the radii of a pair.
+    new_links : {"balanced", "slack"}
+        A new link has the multiplier that holds its discs at contact; or none, as in the
+        literature: then it draws them together first, which parts near neighbours that do not
+        touch by some hundredths of a diameter, however short the step.
     adaptive : bool
         Raise beta and the penalty while overlaps do not halve in 20 iterations.
     overlap, gap : float
@@ -254,6 +260,7 @@ class TimeStepping(SpatialMethod):
     beta: float | None = None
     damping: float | None = None
     augmentation: float | None = None
+    new_links: str = "balanced"
     adaptive: bool = False
     overlap: float = 1e-3
     gap: float = 1e-2
@@ -267,7 +274,11 @@ class TimeStepping(SpatialMethod):
     def __post_init__(self) -> None:
         problems = [
             f"{name} = {getattr(self, name)!r}: must be one of {', '.join(map(repr, known))}"
-            for name, known in (("form", _FORMS), ("constraint", _CONSTRAINTS))
+            for name, known in (
+                ("form", _FORMS),
+                ("constraint", _CONSTRAINTS),
+                ("new_links", _NEW_LINKS),
+            )
             if getattr(self, name) not in known
         ]
         if not 0 < self.step <= _LONGEST_STEP:

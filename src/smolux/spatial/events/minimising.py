@@ -49,6 +49,7 @@ class Recipe(NamedTuple):
     overlap: float
     gap: float
     iterations: int
+    first: float  # multiplier of a new link: a link is in balance at 1
 
 
 class Local(NamedTuple):
@@ -138,7 +139,7 @@ def bind(d):
         return True
 
     @cold_piece
-    def load(s, local, begin):
+    def load(s, local, recipe, begin):
         """Take up the discs of new contacts, and where all are; False if there is no room."""
         for a in range(s.count[SLOTS]):
             i = local.disc[a]
@@ -163,6 +164,7 @@ def bind(d):
             while local.near[p, 0] != a or local.near[p, 1] != b:
                 p += 1
             local.near[p, 2] = LINKED
+            local.multiplier[p] = larger(local.multiplier[p], recipe.first)
         return True
 
     @piece

@@ -135,7 +135,7 @@ def bind(d, look):
     @piece
     def part_non_rigid(s, local, recipe, begin, n):
         """Minimise from the contacts there are."""
-        if not load(s, local, begin):
+        if not load(s, local, recipe, begin):
             return FULL
         s.count[MINIMISATIONS] += 1
         code = minimise(s, local, recipe, n)
