@@ -22,6 +22,7 @@ particles = 500
 replicas = 3
 seed = 7
 sizes = 32
+method = "acceptance-rejection"
 [output]
 figures = []
 """

@@ -11,7 +11,8 @@ from smolux.errors import InputError
 
 
 def case(kernel: str, run: str = "times = [2]", rest: str = ""):
-    return parse(f"[kernel]\n{kernel}\n{rest}\n[run]\n{run}\nseed = 1\n")
+    run += '\nseed = 1\nmethod = "acceptance-rejection"\n'
+    return parse(f"[kernel]\n{kernel}\n{rest}\n[run]\n{run}")
 
 
 # --- gelation ----------------------------------------------------------------------------------
@@ -79,8 +80,9 @@ def test_the_number_of_collisions_is_about_right(population):
     )
     cost = estimate.estimate(given)
     ds = smolux.simulate(
-        given.model, [30], particles=40_000, replicas=2, seed=5, population=population
-    )
+        given.model, [30], particles=40_000, replicas=2, seed=5, population=population,
+        method="acceptance-rejection",
+    )  # fmt: skip
     assert cost.collisions == pytest.approx(float(ds.attrs["events"]), rel=0.1)
     assert 0 < cost.seconds < 60
     assert cost.output > ds.nbytes * 0.5

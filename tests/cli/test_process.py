@@ -31,6 +31,7 @@ replicas = 3
 checkpoint_every = 0.2
 seed = 11
 sizes = 64
+method = "acceptance-rejection"
 [output]
 figures = []
 """

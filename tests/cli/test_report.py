@@ -21,6 +21,7 @@ particles = 300
 replicas = 4
 seed = 5
 sizes = 16
+method = "acceptance-rejection"
 """
 
 
@@ -51,7 +52,10 @@ class Page(HTMLParser):
 def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     case = parse(CASE)
-    ds = smolux.simulate(case.model, [1, 2], particles=300, replicas=4, seed=5, sizes=16)
+    ds = smolux.simulate(
+        case.model, [1, 2], particles=300, replicas=4, seed=5, sizes=16,
+        method="acceptance-rejection",
+    )  # fmt: skip
     ds.attrs["warnings"] = '["mind the <gap>"]'
     files, remarks = figures.write(("clusters",), ds, folder)
     assert remarks == []

@@ -34,6 +34,8 @@ def small(monkeypatch, tmp_path):
 
     def small_simulation(model, times, **settings):
         few = min(settings.get("particles", 100_000), 1000 * settings.get("subvolumes", 1))
+        # auto would choose for the few particles, and loops beyond those of other tests
+        settings = {"method": "acceptance-rejection"} | settings
         settings |= {"particles": few, "replicas": 3}
         if "target_error" in settings:
             settings |= {"replicas": 8, "max_replicas": 12}
