@@ -23,6 +23,9 @@ SETTINGS: dict[str, Any] = {
     "method": "acceptance-rejection",
 }  # fmt: skip
 
+#: where other processes find what tests import
+FOLDERS = [str(folder) for folder in Path(__file__).parents[:2]]
+
 
 def simulate(**given: Any) -> Any:
     return sx.simulate(runs.model(0.1), [0.5, 3.0], **SETTINGS | given)
@@ -217,11 +220,9 @@ def found_here() -> Any:
     """Let workers, new ones too, find the functions of this file."""
     from distributed import WorkerPlugin
 
-    folder = str(Path(__file__).parent)
-
     class Found(WorkerPlugin):
         def setup(self, worker: Any) -> None:
-            sys.path.append(folder)
+            sys.path.extend(FOLDERS)
 
     return Found()
 
@@ -246,7 +247,7 @@ def test_mpi(tmp_path: Path, expected: Any) -> None:
     script = tmp_path / "run.py"
     script.write_text(
         "import sys\n"
-        f"sys.path.append({str(Path(__file__).parent)!r})\n"
+        f"sys.path += {FOLDERS!r}\n"
         "import runs\nimport smolux as sx\nfrom smolux.executors import opened\n"
         "if __name__ == '__main__':\n"
         "    with opened('mpi') as pool:\n"
