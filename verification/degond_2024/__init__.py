@@ -47,6 +47,8 @@ SUITE = Suite(
         "those of an independent, exact program.",
         "Figures 7, 8, 10, 11 and 13 to 17 and the time to the final cluster are of the same runs; "
         "their processor time is booked to the first of them that is computed.",
+        "Time steps in these figures begin new links without a multiplier, as the paper does; what "
+        "smolux does unless told otherwise is in the item on short steps.",
         "Deviations are given in standard errors, those of few runs converted from Student's law "
         "to the normal one. The largest of a few dozen may reach 3 by chance; the limit is 4.5.",
         "The paper's three contacts of six are not found: exact sticking makes a tree, with two of "

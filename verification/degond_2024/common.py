@@ -41,7 +41,8 @@ def method_of(name: str) -> SpatialMethod:
     """Return the method of a name in `METHODS`."""
     if name == EVENTS:
         return sp.Windowed()
-    return sp.TimeStepping(step=float(name.split()[1]))
+    # as in the paper: new links begin without a multiplier
+    return sp.TimeStepping(step=float(name.split()[1]), new_links="slack")
 
 
 @dataclass(frozen=True)
