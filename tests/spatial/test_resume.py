@@ -53,7 +53,7 @@ def test_what_is_reached_already():
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs timers")
 def test_ctrl_c_leaves_what_was_reached():
     """It comes while the compiled loop runs; the events of that loop must not be lost."""
-    s = sp.lattice(14_400, 0.1, seed=1)
+    s = sp.lattice(40_000, 0.1, seed=1)
     sp.simulate(s, max_events=10)  # compiled from here on
 
     before = signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
@@ -67,11 +67,11 @@ def test_ctrl_c_leaves_what_was_reached():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     part = caught.value.dataset
     assert part.attrs["stopped"] == "interrupted"
-    assert 1 < len(np.unique(part["cluster"])) == 14_400 - part["events"].sizes["event"]
+    assert 1 < len(np.unique(part["cluster"])) == 40_000 - part["events"].sizes["event"]
     same = sp.replay(part, part.attrs["time_reached"])
     np.testing.assert_allclose(same["position"], part["position"], atol=1e-9)
     done = sp.resume(part)
-    assert done["events"].sizes["event"] == 14_399
+    assert done["events"].sizes["event"] == 39_999
     k = part["events"].sizes["event"]
     np.testing.assert_array_equal(merges(done)[0][:k], merges(part)[0])
     assert np.abs(done["events"]["gap"]).max() < 1e-9
