@@ -60,7 +60,7 @@ def _replicas(executor: object) -> float:
     """Wall seconds of four replicas of a second or so, on workers that are warm."""
     start = time.perf_counter()
     sx.simulate(
-        MODEL, [10.0], particles=4_000_000, replicas=4, seed=1, method="size-class",
+        MODEL, [10.0], particles=8_000_000, replicas=4, seed=1, method="size-class",
         executor=executor,  # type: ignore[arg-type]
     )  # fmt: skip
     return time.perf_counter() - start
@@ -105,7 +105,7 @@ def main() -> None:
                           f"{memory:.1f}"])  # fmt: skip
             print(large[-1], flush=True)
     lines = [
-        "Four replicas of 4 10^6 particles, ballistic kernel, to t = 10, wall seconds:",
+        "Four replicas of 8 10^6 particles, ballistic kernel, to t = 10, wall seconds:",
         "",
         *table(["workers are", "one, s", "two, s", "ratio", "target", "met"], rows),
         "",
