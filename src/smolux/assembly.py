@@ -217,11 +217,12 @@ class _Proved:
     def __call__(self, a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any]:
         boxes = np.stack(np.broadcast_arrays(*(np.asarray(x, float) for x in (a, b, c, d))))
         key = hashlib.sha256(repr(boxes.shape).encode() + boxes.tobytes()).digest()
-        if key not in self._known:
+        found = self._known.get(key)
+        if found is None:
+            found = self._bounds(a, b, c, d)
             while len(self._known) >= self._MOST:
                 self._known.pop(next(iter(self._known)), None)
-            self._known[key] = self._bounds(a, b, c, d)
-        found = self._known.get(key) or self._bounds(a, b, c, d)
+            self._known[key] = found
         return found[0].copy(), found[1].copy()
 
 

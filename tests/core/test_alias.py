@@ -18,8 +18,9 @@ def draw(weights, state, number):  # type: ignore[no-untyped-def]
     share, other, queue = np.zeros(n), np.zeros(n, np.int32), np.zeros(n, np.int32)
     alias.build(weights, weights.sum(), share, other, queue)
     counts = np.zeros(n, np.int64)
+    either = (np.arange(n) << 32) | other  # what a column keeps, and what its alias gives
     for _ in range(number):
-        counts[alias.outcome(share, other, n, uniform(state))] += 1
+        counts[alias.outcome(share, either, n, uniform(state))] += 1
     return counts, share, other
 
 

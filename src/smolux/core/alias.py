@@ -50,9 +50,13 @@ def build(weights, total, share, alias, queue):
 
 
 @piece
-def outcome(share, alias, n, x):
-    """Outcome of a table of `n` columns for a uniform number."""
+def outcome(share, either, n, x):
+    """Outcome of a table of `n` columns for a uniform number.
+
+    `either` has for each column its own outcome in the upper half and that of its alias in the
+    lower one: both are there with one read, and a choice costs less than a branch.
+    """
     x *= n
     k = np.int64(x)
-    other = np.int64(alias[at(k)])  # read in any case: a choice costs less than a branch
-    return k if x - k < share[at(k)] else other
+    both = either[at(k)]
+    return both >> 32 if x - k < share[at(k)] else both & 0xFFFFFFFF

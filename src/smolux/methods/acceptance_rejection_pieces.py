@@ -194,14 +194,19 @@ def _exchange(w, monomers, stored, a, b, size, count):
 
 
 @piece
-def _exchange_one(w, monomers, stored, slot, size, count):
-    """Take the particle of a slot out and put others in: one, or any number of monomers."""
+def _without(w, monomers, stored, slot):
+    """Take the particle of a slot out: the last of its kind moves into the gap."""
     place = slot - monomers
     if place < 0:
-        monomers -= 1
-    else:  # the last of its kind moves into the gap
-        stored -= 1
-        w.sizes[at(place)] = w.sizes[at(stored)]
+        return monomers - 1, stored
+    w.sizes[at(place)] = w.sizes[at(stored - 1)]
+    return monomers, stored - 1
+
+
+@piece
+def _exchange_one(w, monomers, stored, slot, size, count):
+    """Take the particle of a slot out and put others in: one, or any number of monomers."""
+    monomers, stored = _without(w, monomers, stored, slot)
     if size == 1:
         return monomers + count, stored
     w.sizes[at(stored)] = size
@@ -250,13 +255,8 @@ def _release(s, held):
 
 @piece
 def _remove(s, w, slot):
-    """Take a particle out: the last of its kind moves into the gap."""
-    place = slot - s.count[MONOMERS]
-    if place < 0:
-        s.count[MONOMERS] -= 1
-        return
-    s.count[STORED] -= 1
-    w.sizes[place] = w.sizes[s.count[STORED]]
+    """Take a particle out."""
+    s.count[MONOMERS], s.count[STORED] = _without(w, s.count[MONOMERS], s.count[STORED], slot)
 
 
 @piece

@@ -179,7 +179,7 @@ class SizeClass(Method):
         bits, chunk = self._bits(particles), _chunk(particles)
         classes = _class_of(2 * particles, bits) + (_OCTAVES << bits)
         lists = 4 * classes * ((particles >> chunk) + 2)
-        return 4 * particles + lists + 18 * classes**2 + (4 * (classes + (2 << bits)) << chunk)
+        return 4 * particles + lists + 18 * classes**2 + (4 * classes << chunk)
 
 
 def _chunk(particles: int) -> int:
@@ -195,20 +195,13 @@ def _empty(replicas: int, classes: int, bits: int, chunk: int, particles: int, w
     """Make arrays for this many classes, without particles."""
     # a class may hold all particles; every list may end in a chunk that is not full
     stride = (particles >> chunk) + 2
-    single = 2 << bits
-    chunks = stride + classes + single
+    chunks = stride + classes
     meta = np.zeros((replicas, META), np.int64)
-    meta[:, (BITS, CHUNK, FREE)] = bits, chunk, chunks - single
+    meta[:, (BITS, CHUNK, FREE)] = bits, chunk, chunks
     meta[:, NEXT], meta[:, STALE] = AHEAD, 1
     meta[:, WIDEST] = np.iinfo(np.int64).max if wide else _NARROW
     pairs = classes * (classes + 1) // 2
     free = np.tile(np.arange(chunks, dtype=np.int32)[::-1], (replicas, 1))
-
-    # each class of one size has a chunk for good, whose first entry is that size
-    where = np.zeros((replicas, classes, stride), np.int32)
-    where[:, :single, 0] = np.arange(single)
-    pool = np.zeros((replicas, chunks << chunk), np.int64 if wide else np.int32)
-    pool[:, np.arange(single) << chunk] = np.arange(single)
 
     def zeros(columns: int, kind: Any) -> Any:
         return np.zeros((replicas, columns), kind)
@@ -219,9 +212,9 @@ def _empty(replicas: int, classes: int, bits: int, chunk: int, particles: int, w
         room=zeros(classes, np.int64),
         flow=zeros(classes, np.int64),
         before=zeros(classes, np.int64),
-        where=where,
+        where=np.zeros((replicas, classes, stride), np.int32),
         free=free,
-        pool=pool,
+        pool=zeros(chunks << chunk, np.int64 if wide else np.int32),
         weight=zeros(pairs, float),
         share=zeros(pairs, float),
         alias=zeros(pairs, np.int32),
@@ -232,7 +225,7 @@ def _empty(replicas: int, classes: int, bits: int, chunk: int, particles: int, w
         two=zeros(AHEAD, np.int64),
         mark=zeros(AHEAD, float),
         wait=zeros(AHEAD, float),
-        mask=_mask(classes, single),
+        mask=_mask(classes, 2 << bits),
         high=np.full((classes, classes), np.nan),
         low=np.full((classes, classes), np.nan),
     )

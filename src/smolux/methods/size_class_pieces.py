@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..core import rng
+from ..core.alias import outcome
 from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
 from ..core.loop import PATIENCE, Pieces, note_bad, repair
@@ -29,7 +30,7 @@ from .size_class_store import (
     size_at,
     view,
 )
-from .size_class_table import column, prepare
+from .size_class_table import prepare
 
 #: a chosen particle is a number of this many bits within its class, and the class above them
 _SLOT_BITS = 44
@@ -75,7 +76,7 @@ def _draw_ahead(w, s, a, b, c, d):
     pairs = w.meta[PAIRS]
     for k in range(AHEAD):
         x, a, b, c, d = rng.uniform_of(a, b, c, d)
-        w.one[at(k)] = column(w.share, w.either, pairs, x)
+        w.one[at(k)] = outcome(w.share, w.either, pairs, x)
     for k in range(AHEAD):
         g, h = w.one[at(k)] >> 16, w.one[at(k)] & 0xFFFF
         x, a, b, c, d = rng.uniform_of(a, b, c, d)

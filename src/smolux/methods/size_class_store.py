@@ -33,9 +33,6 @@ SHARE = 16
 class Work(NamedTuple):
     """Classes of sizes; those of one size are only counted, the others are lists.
 
-    A class of one size is a list whose entries are all in one place, where that size is: what is
-    done to a particle then needs no branch that a processor could not foresee.
-
     Attributes
     ----------
     meta : int64 array of shape (R, META)
@@ -68,7 +65,7 @@ class Work(NamedTuple):
     wait : float64 array of shape (R, AHEAD)
         Their waiting times, of mean 1.
     mask : int64 array of shape (G,)
-        For slots: -1 if a class is a list, 0 if its entries are in one place.
+        For slots: -1 if a class is a list, 0 if its particles are only counted.
     high, low : float64 arrays of shape (G, G)
         Bounds of the rate for each pair of classes, the lower one as a share of the upper; `low` is
         NaN until asked for, `high` also where there is no finite bound.

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..core.alias import build
-from ..core.compile import at, cold_piece, piece
+from ..core.compile import cold_piece, piece
 from ..core.slots import slot_top
 from ..core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
 from .size_class_store import AHEAD, BITS, BLOCK, CHUNK, NEXT, PAIRS, SHARE, SPAN, STALE
@@ -113,15 +113,6 @@ def _renew(s, w):
         for k in range(pairs):
             w.either[k] = (np.int64(w.classes[k]) << 32) | w.classes[w.alias[k]]
     return 0
-
-
-@piece
-def column(share, either, n, x):
-    """Return the two classes of a pair for a uniform number, as `alias.outcome` would."""
-    x *= n
-    k = np.int64(x)
-    both = either[at(k)]
-    return both >> 32 if x - k < share[at(k)] else both & 0xFFFFFFFF
 
 
 @piece
