@@ -9,7 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .compile import at, cold_piece, piece
+from .compile import cold_piece, piece
+from .wide import upper_half
+
+_HALF, _LOWER = np.uint64(32), np.uint64((1 << 32) - 1)
+_WORD, _UPPER = 2.0**64, 2.0**32
+_BELOW_ONE = 1.0 - 2.0**-53
 
 
 @cold_piece
@@ -49,14 +54,56 @@ def build(weights, total, share, alias, queue):
         share[queue[k]] = 1.0
 
 
-@piece
-def outcome(share, either, n, x):
-    """Outcome of a table of `n` columns for a uniform number.
+@cold_piece
+def pack(n, share, alias, code, sure, table):
+    """Write a table for `draw`: for each column, what a choice reads, side by side.
 
-    `either` has for each column its own outcome in the upper half and that of its alias in the
-    lower one: both are there with one read, and a choice costs less than a branch.
+    Outcomes are known by ``code[k]`` (32 bits); ``sure[k]`` is the probability, or less, that they
+    are accepted whatever they turn out to be. The three words of a column are the share it keeps,
+    the codes of its own outcome and of its alias, and below which remainder each of them is sure
+    to be accepted, 32 bits each.
     """
-    x *= n
-    k = np.int64(x)
-    both = either[at(k)]
-    return both >> 32 if x - k < share[at(k)] else both & 0xFFFFFFFF
+    for k in range(n):
+        other, kept = alias[k], min(share[k], 1.0)
+        table[3 * k] = _fixed(kept, _WORD)
+        table[3 * k + 1] = (np.uint64(code[k]) << _HALF) | np.uint64(code[other])
+        own = _fixed(kept * sure[k], _UPPER)
+        its = _fixed(kept + (1.0 - kept) * sure[other], _UPPER)
+        table[3 * k + 2] = (own << _HALF) | its
+
+
+@piece
+def _fixed(x, scale):
+    """Turn a number in [0, 1] into whole parts of `scale`, rounded down; 1 becomes ``scale - 1``."""
+    return np.uint64(min(x * scale, scale * _BELOW_ONE))
+
+
+@piece
+def draw(table, n, word):
+    """Draw from a table of `n` columns by 64 random bits.
+
+    Returns
+    -------
+    code : uint64
+        Of the outcome.
+    column, rest : uint64
+        Of the table, and what is left of the random bits, for `remainder`.
+    sure : bool
+        Whether it is accepted at once.
+    """
+    column, rest = upper_half(word, n), word * n
+    first = np.uint64(3) * column
+    both, limits = table[first + np.uint64(1)], table[first + np.uint64(2)]
+    # a choice costs less than a branch
+    shift = _HALF if rest < table[first] else np.uint64(0)
+    code = (both >> shift) & _LOWER
+    return code, column, rest, rest >> _HALF < (limits >> shift) & _LOWER
+
+
+@piece
+def remainder(table, column, rest):
+    """Uniform number in [0, 1) given the outcome: where in its part of the column the draw fell."""
+    share = table[np.uint64(3) * column]
+    if rest < share:
+        return float(rest) / float(share)
+    return float(rest - share) / (_WORD - float(share))

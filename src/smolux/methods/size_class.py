@@ -14,7 +14,19 @@ from ..errors import InputError
 from . import size_class_pieces as pieces
 from .base import Int, Method, Rates, Words, enlarged, spread
 from .size_class_deal import Pile, collect, split
-from .size_class_store import AHEAD, BITS, CHUNK, FREE, META, NEXT, SPAN, STALE, WIDEST, Work
+from .size_class_store import (
+    AHEAD,
+    BITS,
+    CHUNK,
+    FREE,
+    META,
+    NEXT,
+    SINGLE,
+    SPAN,
+    STALE,
+    WIDEST,
+    Work,
+)
 
 #: octaves of sizes by which arrays and bounds are extended
 _OCTAVES = 4
@@ -86,7 +98,7 @@ class SizeClass(Method):
         for r, (sizes, counts) in enumerate(populations[:1] if same else populations):
             _fill(work, r, sizes, counts, edges)
         if same:
-            for array in (work.meta, work.number, work.where, work.pool):
+            for array in (work.meta, work.number, work.tail, work.where, work.pool):
                 array[1:] = array[0]
         work.before[:] = work.number
         return work
@@ -131,7 +143,7 @@ class SizeClass(Method):
 
     def population(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
         """See `Method.population`."""
-        number, single = work.number[replica], 2 << int(work.meta[0, BITS])
+        number, single = work.number[replica], int(work.meta[0, SINGLE])
         small = np.flatnonzero(number[:single])
         lists = [_members(work, replica, g) for g in range(single, len(number)) if number[g]]
         large, counts = np.unique(
@@ -197,7 +209,7 @@ def _empty(replicas: int, classes: int, bits: int, chunk: int, particles: int, w
     stride = (particles >> chunk) + 2
     chunks = stride + classes
     meta = np.zeros((replicas, META), np.int64)
-    meta[:, (BITS, CHUNK, FREE)] = bits, chunk, chunks
+    meta[:, (BITS, CHUNK, FREE, SINGLE)] = bits, chunk, chunks, 2 << bits
     meta[:, NEXT], meta[:, STALE] = AHEAD, 1
     meta[:, WIDEST] = np.iinfo(np.int64).max if wide else _NARROW
     pairs = classes * (classes + 1) // 2
@@ -212,27 +224,26 @@ def _empty(replicas: int, classes: int, bits: int, chunk: int, particles: int, w
         room=zeros(classes, np.int64),
         flow=zeros(classes, np.int64),
         before=zeros(classes, np.int64),
+        tail=zeros(classes, np.int64),
         where=np.zeros((replicas, classes, stride), np.int32),
         free=free,
         pool=zeros(chunks << chunk, np.int64 if wide else np.int32),
+        table=zeros(3 * pairs, np.uint64),
         weight=zeros(pairs, float),
         share=zeros(pairs, float),
         alias=zeros(pairs, np.int32),
-        classes=zeros(pairs, np.int32),
-        either=zeros(pairs, np.int64),
+        classes=zeros(pairs, np.uint32),
         queue=zeros(pairs, np.int32),
         one=zeros(AHEAD, np.int64),
         two=zeros(AHEAD, np.int64),
-        mark=zeros(AHEAD, float),
+        place_one=zeros(AHEAD, np.int64),
+        place_two=zeros(AHEAD, np.int64),
+        column=zeros(AHEAD, np.int64),
+        rest=zeros(AHEAD, np.uint64),
         wait=zeros(AHEAD, float),
-        mask=_mask(classes, 2 << bits),
         high=np.full((classes, classes), np.nan),
         low=np.full((classes, classes), np.nan),
     )
-
-
-def _mask(classes: int, single: int) -> Int:
-    return np.where(np.arange(classes) < single, 0, -1)
 
 
 def _fill(work: Work, r: int, sizes: Int, counts: Int, edges: Int) -> None:
@@ -255,6 +266,7 @@ def _fill(work: Work, r: int, sizes: Int, counts: Int, edges: Int) -> None:
         for k, c in enumerate(taken):
             part = held[k << chunk : (k + 1) << chunk]
             work.pool[r, int(c) << chunk : (int(c) << chunk) + len(part)] = part
+        work.tail[r, g] = (int(taken[-1]) << chunk) + len(part) - 1
 
 
 def _members(work: Work, r: int, g: int) -> Int:
@@ -273,15 +285,15 @@ def _more_classes(work: Work, classes: int) -> Work:
     high[:old, :old], low[:old, :old] = work.high, work.low
     where = np.zeros((len(work.meta), classes, work.where.shape[2]), np.int32)
     where[:, :old] = work.where
-    mask = _mask(classes, int(np.argmin(work.mask)))
     by_class = {
-        f: enlarged(getattr(work, f), classes) for f in ("number", "room", "flow", "before")
+        f: enlarged(getattr(work, f), classes) for f in ("number", "room", "flow", "before", "tail")
     }
     by_pair = {
         f: enlarged(getattr(work, f), pairs)
-        for f in ("weight", "share", "alias", "classes", "either", "queue")
+        for f in ("weight", "share", "alias", "classes", "queue")
     }
-    return work._replace(high=high, low=low, mask=mask, where=where, **by_class, **by_pair)
+    by_pair["table"] = enlarged(work.table, 3 * pairs)
+    return work._replace(high=high, low=low, where=where, **by_class, **by_pair)
 
 
 def _more_chunks(work: Work) -> Work:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.compile import entry
 from ..core.rng import below
-from .size_class_store import BITS, WIDEST, append, size_at, view
+from .size_class_store import BITS, SINGLE, WIDEST, append, is_list, place, view
 
 
 class Pile(NamedTuple):
@@ -42,28 +42,28 @@ def _compiled() -> tuple[Any, Any]:
         for k in range(4):
             s[k] = words[k]
         for g in range(w.number.shape[0]):
-            if w.mask[g] != 0:
+            if is_list(w, g):
                 for _ in range(copies * w.number[g]):
                     number[below(s, parts), g] += 1
         total = np.int64(0)
         for k in range(parts):
             for g in range(w.number.shape[0]):
-                if w.mask[g] != 0:
+                if is_list(w, g):
                     next_free[k, g] = total
                     total += number[k, g]
         for k in range(4):
             s[k] = words[k]
         for g in range(w.number.shape[0]):
-            if w.mask[g] != 0:
+            if is_list(w, g):
                 for m in range(copies * w.number[g]):
                     k = below(s, parts)
-                    sizes[next_free[k, g]] = size_at(w, g, m // copies)
+                    sizes[next_free[k, g]] = w.pool[place(w, g, m // copies)]
                     next_free[k, g] += 1
 
     def collect(work, number, sizes):
         w, n = view(work, 0), np.int64(0)
         for g in range(number.shape[0]):
-            if w.mask[g] == 0:
+            if not is_list(w, g):
                 w.number[g] += number[g]
             else:
                 for _ in range(number[g]):
@@ -75,7 +75,8 @@ def _compiled() -> tuple[Any, Any]:
 
 def split(work: Any, parts: int, copies: int, words: NDArray[np.uint64]) -> list[Pile]:
     """Put every particle `copies` times into one of several piles, each as likely as the other."""
-    bits, listed = int(work.meta[0, BITS]), work.mask != 0
+    bits = int(work.meta[0, BITS])
+    listed = np.arange(work.number.shape[1]) >= work.meta[0, SINGLE]
     number = np.zeros((parts, len(listed)), np.int64)
     rng = np.random.default_rng(words)
     counts = copies * work.number[0, ~listed]

@@ -7,23 +7,26 @@ from typing import Any
 
 import numpy as np
 
-from ..core import rng
-from ..core.alias import outcome
+from ..core import alias, rng
 from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
 from ..core.loop import PATIENCE, Pieces, note_bad, repair
 from ..core.prefetch import prefetch
 from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, VOLUME
+from ..core.wide import upper_half
 from .size_class_store import (
     AHEAD,
     BLOCK,
     FREE,
     NEXT,
     PAIRS,
+    SLOT,
+    SLOT_BITS,
     STALE,
     chunks_for,
     double,
     insert,
+    is_list,
     make_visit,
     place,
     remove,
@@ -32,17 +35,20 @@ from .size_class_store import (
 )
 from .size_class_table import prepare
 
-#: a chosen particle is a number of this many bits within its class, and the class above them
-_SLOT_BITS = 44
-_SLOT = (1 << _SLOT_BITS) - 1
+
+@piece
+def _place(w, one):
+    """Place of a chosen particle in the pool; 0 if it is only counted."""
+    g = one >> SLOT_BITS
+    return place(w, g, one & SLOT) if is_list(w, g) else np.int64(0)
 
 
 @piece
 def _pair(s, w):
     a, b = s.count[FIRST], s.count[SECOND]
     return (
-        size_at(w, a >> _SLOT_BITS, a & _SLOT),
-        size_at(w, b >> _SLOT_BITS, b & _SLOT),
+        size_at(w, a >> SLOT_BITS, _place(w, a)),
+        size_at(w, b >> SLOT_BITS, _place(w, b)),
     )
 
 
@@ -52,7 +58,8 @@ def _lone(s, w, k):
     while k >= w.number[g]:
         k -= w.number[g]
         g += 1
-    return (g << _SLOT_BITS) | k, size_at(w, g, k)
+    one = (g << SLOT_BITS) | k
+    return one, size_at(w, g, _place(w, one))
 
 
 @piece
@@ -61,10 +68,11 @@ def _seize(s, w, place):
 
 
 @piece
-def _ask_for(w, one):
-    """Have the memory of a particle fetched; without a branch, also for those only counted."""
-    g = one >> _SLOT_BITS
-    prefetch(w.pool, place(w, g, one & _SLOT & w.mask[at(g)]))
+def _aim(w, g, slot):
+    """Place of a slot, of which the memory is asked for; without a branch."""
+    there = place(w, g, slot if is_list(w, g) else 0)
+    prefetch(w.pool, there)
+    return there
 
 
 @cold_piece
@@ -73,23 +81,24 @@ def _draw_ahead(w, s, a, b, c, d):
 
     One kind of number after the other: short loops overlap their reads of memory.
     """
-    pairs = w.meta[PAIRS]
+    pairs = np.uint64(w.meta[PAIRS])
     for k in range(AHEAD):
-        x, a, b, c, d = rng.uniform_of(a, b, c, d)
-        w.one[at(k)] = outcome(w.share, w.either, pairs, x)
+        word, a, b, c, d = rng.step(a, b, c, d)
+        code, column, rest, sure = alias.draw(w.table, pairs, word)
+        w.one[at(k)] = code
+        w.rest[at(k)] = rest
+        w.column[at(k)] = -1 if sure else np.int64(column)
     for k in range(AHEAD):
         g, h = w.one[at(k)] >> 16, w.one[at(k)] & 0xFFFF
-        x, a, b, c, d = rng.uniform_of(a, b, c, d)
-        y, a, b, c, d = rng.uniform_of(a, b, c, d)
-        x, y = x * w.room[at(g)], y * w.room[at(h)]
-        w.one[at(k)] = (g << _SLOT_BITS) | np.int64(x)
-        w.two[at(k)] = (h << _SLOT_BITS) | np.int64(y)
+        x, a, b, c, d = rng.step(a, b, c, d)
+        y, a, b, c, d = rng.step(a, b, c, d)
+        x = np.int64(upper_half(x, np.uint64(w.room[at(g)])))
+        y = np.int64(upper_half(y, np.uint64(w.room[at(h)])))
+        w.one[at(k)] = (g << SLOT_BITS) | x
+        w.two[at(k)] = (h << SLOT_BITS) | y
+        w.place_one[at(k)] = _aim(w, g, x)
+        w.place_two[at(k)] = _aim(w, h, y)
     for k in range(AHEAD):
-        _ask_for(w, w.one[at(k)])
-        _ask_for(w, w.two[at(k)])
-        g, h = w.one[at(k)] >> _SLOT_BITS, w.two[at(k)] >> _SLOT_BITS
-        x, a, b, c, d = rng.uniform_of(a, b, c, d)
-        w.mark[at(k)] = -1.0 if x < w.low[at(g), at(h)] else x
         w.wait[at(k)], a, b, c, d = rng.exponential_of(s, a, b, c, d)
     w.meta[NEXT] = 0
     return a, b, c, d
@@ -106,9 +115,10 @@ def _raise_bound(s, w, g, h, i, j, value):
 
 def _make_find(rate: Any) -> Any:
     @piece
-    def accepts(s, w, g, h, i, j, u, p):
-        """Whether the rate accepts a candidate: 1 or 0; -1 if there is no rate."""
-        if u < 0.0:
+    def accepts(s, w, g, h, i, j, k, p):
+        """Whether the rate accepts candidate `k`: 1 or 0; -1 if there is no rate."""
+        column = w.column[at(k)]
+        if column < 0:
             return 1
         value = rate(float(i), float(j), *p)
         if not 0.0 <= value <= w.high[at(g), at(h)]:
@@ -117,6 +127,7 @@ def _make_find(rate: Any) -> Any:
                 return -1
             _raise_bound(s, w, g, h, i, j, value)
             return 1
+        u = alias.remainder(w.table, np.uint64(column), w.rest[at(k)])
         return 1 if u * w.high[at(g), at(h)] < value else 0
 
     @piece
@@ -132,11 +143,12 @@ def _make_find(rate: Any) -> Any:
             trials += 1
             waited += w.wait[at(k)]
             one, two = w.one[at(k)], w.two[at(k)]
-            g, a, h, b = one >> _SLOT_BITS, one & _SLOT, two >> _SLOT_BITS, two & _SLOT
+            g, a, h, b = one >> SLOT_BITS, one & SLOT, two >> SLOT_BITS, two & SLOT
             if a >= w.number[at(g)] or b >= w.number[at(h)] or one == two:
                 continue
-            i, j = size_at(w, g, a), size_at(w, h, b)
-            taken = accepts(s, w, g, h, i, j, w.mark[at(k)], p)
+            i = size_at(w, g, w.place_one[at(k)])
+            j = size_at(w, h, w.place_two[at(k)])
+            taken = accepts(s, w, g, h, i, j, k, p)
             if taken < 0:
                 return math.nan, one, two, i, j, trials, c0, c1, c2, c3
             if taken == 1:
@@ -160,15 +172,19 @@ def _make_draw(find: Any) -> Any:
 
 
 @piece
-def _remove(w, a, b, gone):
+def _remove(w, gone, a, place_a, b, place_b):
     """Take one of a pair out, or both."""
     if gone != 3:
-        one = a if gone == 1 else b
-        remove(w, one >> _SLOT_BITS, one & _SLOT)
+        if gone == 1:
+            remove(w, a >> SLOT_BITS, place_a)
+        else:
+            remove(w, b >> SLOT_BITS, place_b)
         return
     # the later place of a class goes first: then the other stays where it is
-    remove(w, max(a, b) >> _SLOT_BITS, max(a, b) & _SLOT)
-    remove(w, min(a, b) >> _SLOT_BITS, min(a, b) & _SLOT)
+    if a > b:
+        a, place_a, b, place_b = b, place_b, a, place_a
+    remove(w, b >> SLOT_BITS, place_b)
+    remove(w, a >> SLOT_BITS, place_a)
 
 
 @piece
@@ -179,7 +195,8 @@ def _update(s, w, gone, entries, p):
     if chunks > w.meta[FREE]:
         return False
     if gone > 0:
-        _remove(w, s.count[FIRST], s.count[SECOND], gone)
+        a, b = s.count[FIRST], s.count[SECOND]
+        _remove(w, gone, a, _place(w, a), b, _place(w, b))
         s.count[PARTICLES] -= 2 if gone == 3 else 1
     for e in range(entries):
         insert(w, s.sizes[e], s.counts[e])
@@ -201,7 +218,8 @@ def _hold(s, w):
 def _replace(w, held, a, b, gone, size, count):
     if chunks_for(w, size, count) > w.meta[FREE]:
         return NOT_PLAIN, held
-    _remove(w, a, b, gone)
+    k = at(w.meta[NEXT] - 1)  # the candidate that was accepted
+    _remove(w, gone, a, w.place_one[k], b, w.place_two[k])
     insert(w, size, count)
     return (PLAIN if w.meta[STALE] == 0 else LAST), held
 

@@ -6,11 +6,22 @@ import math
 
 import numpy as np
 
-from ..core.alias import build
+from ..core import alias
 from ..core.compile import cold_piece, piece
 from ..core.slots import slot_top
 from ..core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
-from .size_class_store import AHEAD, BITS, BLOCK, CHUNK, NEXT, PAIRS, SHARE, SPAN, STALE
+from .size_class_store import (
+    AHEAD,
+    BITS,
+    BLOCK,
+    CHUNK,
+    NEXT,
+    PAIRS,
+    SHARE,
+    SPAN,
+    STALE,
+    is_list,
+)
 
 
 @cold_piece
@@ -53,7 +64,7 @@ def _give_room(s, w, used):
         spread = math.sqrt(2.0 * math.log(worth)) if worth > 1.0 else 0.0
         slack = events * gain + spread * math.sqrt(events * come)
         w.room[g] = w.number[g] + np.int64(slack + 0.5)
-        if w.mask[g] != 0:
+        if is_list(w, g):
             w.room[g] = min(w.room[g], most)
         w.before[g] = w.number[g]
         w.flow[g] //= 2
@@ -109,9 +120,10 @@ def _renew(s, w):
     w.meta[NEXT] = AHEAD
     pairs = w.meta[PAIRS]
     if pairs > 0:
-        build(w.weight[:pairs], s.clock[MAJORANT], w.share, w.alias, w.queue)
-        for k in range(pairs):
-            w.either[k] = (np.int64(w.classes[k]) << 32) | w.classes[w.alias[k]]
+        alias.build(w.weight[:pairs], s.clock[MAJORANT], w.share, w.alias, w.queue)
+        for k in range(pairs):  # what is accepted whatever the rate
+            w.weight[k] = w.low[w.classes[k] >> 16, w.classes[k] & 0xFFFF]
+        alias.pack(pairs, w.share, w.alias, w.classes, w.weight, w.table)
     return 0
 
 
