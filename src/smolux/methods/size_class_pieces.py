@@ -174,17 +174,18 @@ def _make_draw(find: Any) -> Any:
 @piece
 def _remove(w, gone, a, place_a, b, place_b):
     """Take one of a pair out, or both."""
+    g, h = a >> SLOT_BITS, b >> SLOT_BITS
     if gone != 3:
         if gone == 1:
-            remove(w, a >> SLOT_BITS, place_a)
+            remove(w, g, place_a)
         else:
-            remove(w, b >> SLOT_BITS, place_b)
+            remove(w, h, place_b)
         return
-    # the later place of a class goes first: then the other stays where it is
-    if a > b:
-        a, place_a, b, place_b = b, place_b, a, place_a
-    remove(w, b >> SLOT_BITS, place_b)
-    remove(w, a >> SLOT_BITS, place_a)
+    # the later slot of a class goes first: then the other stays where it is
+    if g == h and a > b:
+        place_a, place_b = place_b, place_a
+    remove(w, h, place_b)
+    remove(w, g, place_a)
 
 
 @piece

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.compile import at, cold_piece, piece
 from ..core.pool import place_of, return_chunk, take_chunk
+from ..core.prefetch import prefetch
 from ..core.slots import slot_of
 from ..core.state import PARTICLES
 
@@ -31,6 +32,8 @@ META = 10
 #: a particle is a number of this many bits within its class, and the class above them
 SLOT_BITS = 44
 SLOT = (1 << SLOT_BITS) - 1
+#: entries of lists are asked for so far from their ends, as these move
+STRIDE = 32
 #: what one particle that comes in counts for, so that it is not forgotten at once
 SHARE = 16
 
@@ -171,6 +174,7 @@ def remove(w, g, place):
     if is_list(w, g):
         end, bits = w.tail[at(g)], w.meta[CHUNK]
         w.pool[at(place)] = w.pool[at(end)]
+        prefetch(w.pool, end - STRIDE)
         if last & ((1 << bits) - 1) == 0:
             w.meta[FREE] = return_chunk(w.where, w.free, w.meta[FREE], g, last >> bits)
             end = place_of(w.where, g, max(last, 1) - 1, bits) + 1
