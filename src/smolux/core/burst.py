@@ -48,8 +48,8 @@ class Burst(NamedTuple):
     ----------
     row : ``row(s, w)``
         How many events `Pieces.prepare` will find nothing to do for, if they are plain.
-    hold : ``hold(s, w)``
-        Take what changes out of the state.
+    hold : ``hold(s, w, factor)``
+        Take what changes out of the state; the rates are `factor` times those of the kernel.
     find : ``find(s, w, p, factor, held, particles, trials, *words)``
         As `Pieces.draw`: the waiting time, the slots of the pair (-1: nothing happens then) and
         its sizes, the candidates looked at so far and the four words of the random generator.
@@ -125,7 +125,7 @@ def make_burst(
             return 0
         events, trials, repairs = s.count[EVENTS], s.count[TRIALS], s.count[REPAIRS]
         time, factor = s.clock[TIME], windows.total[window]
-        held, reason = hold(s, w), 0
+        held, reason = hold(s, w, factor), 0
         a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
         last = events + left
         while events < last and trials + events < stop:

@@ -165,7 +165,7 @@ def _make_draw(find: Any) -> Any:
         if w.ahead[0] < 0.0:
             for k in range(2 * AHEAD):
                 w.ahead[k] = rng.uniform(s.rng)
-        return draw_one(s, w, p, factor, _hold(s, w))
+        return draw_one(s, w, p, factor, _hold(s, w, factor))
 
     return draw
 
@@ -222,7 +222,7 @@ def _row(s, w):
 
 
 @piece
-def _hold(s, w):
+def _hold(s, w, factor):
     return Held(
         s.count[MONOMERS],
         s.count[STORED],

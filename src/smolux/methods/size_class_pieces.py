@@ -133,7 +133,6 @@ def _make_find(rate: Any) -> Any:
     @piece
     def find(s, w, p, factor, held, n, trials, c0, c1, c2, c3):
         """See `smolux.core.burst.Burst`; NaN for a rate that is none, which has been noted."""
-        unit = s.clock[VOLUME] / (s.clock[MAJORANT] * factor)
         waited, last = 0.0, trials + PATIENCE
         while trials < last:
             if w.meta[NEXT] == AHEAD:
@@ -152,8 +151,8 @@ def _make_find(rate: Any) -> Any:
             if taken < 0:
                 return math.nan, one, two, i, j, trials, c0, c1, c2, c3
             if taken == 1:
-                return waited * unit, one, two, i, j, trials, c0, c1, c2, c3
-        return waited * unit, -1, -1, 0, 0, trials, c0, c1, c2, c3
+                return waited * held[0], one, two, i, j, trials, c0, c1, c2, c3
+        return waited * held[0], -1, -1, 0, 0, trials, c0, c1, c2, c3
 
     return find
 
@@ -166,7 +165,7 @@ def _make_draw(find: Any) -> Any:
         s.count[FIRST] = -1
         if s.count[PARTICLES] < 2 or s.clock[MAJORANT] <= 0.0:
             return math.inf
-        return draw_one(s, w, p, factor, _hold(s, w))
+        return draw_one(s, w, p, factor, _hold(s, w, factor))
 
     return draw
 
@@ -211,8 +210,9 @@ def _row(s, w):
 
 
 @piece
-def _hold(s, w):
-    return ()
+def _hold(s, w, factor):
+    # the unit of waiting times; a division at each event would take as long as drawing one
+    return (s.clock[VOLUME] / (s.clock[MAJORANT] * factor),)
 
 
 @piece
