@@ -74,7 +74,7 @@ def pack(n, share, alias, code, sure, table):
 
 @piece
 def _fixed(x, scale):
-    """Turn a number in [0, 1] into whole parts of `scale`, rounded down; 1 becomes ``scale - 1``."""
+    """Turn a number in [0, 1] into whole parts of `scale`, rounded down, less than all of them."""
     return np.uint64(min(x * scale, scale * _BELOW_ONE))
 
 

@@ -14,7 +14,7 @@ from ..errors import InputError
 from . import size_class_pieces as pieces
 from .base import Int, Method, Rates, Words, enlarged, spread
 from .size_class_deal import Pile, collect, split
-from .size_class_store import (
+from .size_class_state import (
     AHEAD,
     BITS,
     CHUNK,

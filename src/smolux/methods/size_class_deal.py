@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ..core.compile import entry
 from ..core.rng import below
-from .size_class_store import BITS, SINGLE, WIDEST, append, is_list, place, view
+from .size_class_lists import append, is_list, place_of, size_at
+from .size_class_state import BITS, SINGLE, WIDEST, view
 
 
 class Pile(NamedTuple):
@@ -23,7 +24,7 @@ class Pile(NamedTuple):
     sizes : int64 array
         Of the particles of all lists, class by class.
     bits, widest : int
-        Of the store, see `smolux.methods.size_class_store`.
+        Of the store, see `smolux.methods.size_class_state`.
     """
 
     number: NDArray[np.int64]
@@ -57,7 +58,7 @@ def _compiled() -> tuple[Any, Any]:
             if is_list(w, g):
                 for m in range(copies * w.number[g]):
                     k = below(s, parts)
-                    sizes[next_free[k, g]] = w.pool[place(w, g, m // copies)]
+                    sizes[next_free[k, g]] = size_at(w, g, place_of(w, g, m // copies))
                     next_free[k, g] += 1
 
     def collect(work, number, sizes):

@@ -14,41 +14,18 @@ from ..core.loop import PATIENCE, Pieces, note_bad, repair
 from ..core.prefetch import prefetch
 from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, VOLUME
 from ..core.wide import upper_half
-from .size_class_store import (
-    AHEAD,
-    BLOCK,
-    FREE,
-    NEXT,
-    PAIRS,
-    SLOT,
-    SLOT_BITS,
-    STALE,
-    chunks_for,
-    double,
-    insert,
-    is_list,
-    make_visit,
-    place,
-    remove,
-    size_at,
-    view,
-)
+from .size_class_lists import is_list, place_of, place_of_particle, size_at
+from .size_class_state import AHEAD, BLOCK, FREE, NEXT, PAIRS, SLOT, SLOT_BITS, STALE, view
+from .size_class_store import chunks_for, double, insert, make_visit, remove
 from .size_class_table import prepare
-
-
-@piece
-def _place(w, one):
-    """Place of a chosen particle in the pool; 0 if it is only counted."""
-    g = one >> SLOT_BITS
-    return place(w, g, one & SLOT) if is_list(w, g) else np.int64(0)
 
 
 @piece
 def _pair(s, w):
     a, b = s.count[FIRST], s.count[SECOND]
     return (
-        size_at(w, a >> SLOT_BITS, _place(w, a)),
-        size_at(w, b >> SLOT_BITS, _place(w, b)),
+        size_at(w, a >> SLOT_BITS, place_of_particle(w, a)),
+        size_at(w, b >> SLOT_BITS, place_of_particle(w, b)),
     )
 
 
@@ -59,7 +36,7 @@ def _lone(s, w, k):
         k -= w.number[g]
         g += 1
     one = (g << SLOT_BITS) | k
-    return one, size_at(w, g, _place(w, one))
+    return one, size_at(w, g, place_of_particle(w, one))
 
 
 @piece
@@ -70,7 +47,7 @@ def _seize(s, w, place):
 @piece
 def _aim(w, g, slot):
     """Place of a slot, of which the memory is asked for; without a branch."""
-    there = place(w, g, slot if is_list(w, g) else 0)
+    there = place_of(w, g, slot if is_list(w, g) else 0)
     prefetch(w.pool, there)
     return there
 
@@ -196,7 +173,7 @@ def _update(s, w, gone, entries, p):
         return False
     if gone > 0:
         a, b = s.count[FIRST], s.count[SECOND]
-        _remove(w, gone, a, _place(w, a), b, _place(w, b))
+        _remove(w, gone, a, place_of_particle(w, a), b, place_of_particle(w, b))
         s.count[PARTICLES] -= 2 if gone == 3 else 1
     for e in range(entries):
         insert(w, s.sizes[e], s.counts[e])

@@ -10,18 +10,8 @@ from ..core import alias
 from ..core.compile import cold_piece, piece
 from ..core.slots import slot_top
 from ..core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
-from .size_class_store import (
-    AHEAD,
-    BITS,
-    BLOCK,
-    CHUNK,
-    NEXT,
-    PAIRS,
-    SHARE,
-    SPAN,
-    STALE,
-    is_list,
-)
+from .size_class_lists import is_list
+from .size_class_state import AHEAD, BITS, BLOCK, CHUNK, NEXT, PAIRS, SHARE, SPAN, STALE
 
 
 @cold_piece

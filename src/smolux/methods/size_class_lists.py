@@ -1,0 +1,109 @@
+"""Lists of the particles of each class, in chunks of one pool.
+
+A list grows and shrinks at its end by whole chunks, so that nothing is ever moved to make room and
+the pool need not be larger than all lists together, but for one chunk each.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.compile import at, cold_piece, piece
+from ..core.prefetch import prefetch
+from .size_class_state import AHEAD, CHUNK, FREE, NEXT, SINGLE, SLOT, SLOT_BITS
+
+#: entries are asked for so far from the ends of lists, as these move
+_STRIDE = 32
+
+
+@piece
+def is_list(w, g):
+    """Whether the particles of a class are listed, not only counted."""
+    return g >= w.meta[SINGLE]
+
+
+@piece
+def place_of(w, g, slot):
+    """Place of an entry of a list in the pool."""
+    bits = w.meta[CHUNK]
+    chunk = np.int64(w.where[at(g), at(slot >> bits)])
+    return (chunk << bits) + (slot & ((1 << bits) - 1))
+
+
+@piece
+def size_at(w, g, place):
+    """Size of a particle by its class and place."""
+    return np.int64(w.pool[at(place)]) if is_list(w, g) else np.int64(g)
+
+
+@piece
+def cut(w, g, place, last):
+    """Take an entry out of a list: entry `last`, now its end, moves into the gap."""
+    end, bits = w.tail[at(g)], w.meta[CHUNK]
+    w.pool[at(place)] = w.pool[at(end)]
+    prefetch(w.pool, end - _STRIDE)
+    end -= 1
+    if last & ((1 << bits) - 1) == 0:
+        w.free[at(w.meta[FREE])] = w.where[at(g), at(last >> bits)]
+        w.meta[FREE] += 1
+        end = place_of(w, g, max(last, 1) - 1)
+    w.tail[at(g)] = end
+
+
+@piece
+def append(w, g, size):
+    """Put a particle at the end of a list; there must be a free chunk."""
+    slot, bits = w.number[at(g)], w.meta[CHUNK]
+    end = w.tail[at(g)] + 1
+    if slot & ((1 << bits) - 1) == 0:
+        end = _next_chunk(w, g, slot >> bits)
+    w.tail[at(g)] = end
+    w.number[at(g)] = slot + 1
+    w.pool[at(end)] = size
+
+
+@cold_piece
+def _next_chunk(w, g, chunk):
+    """Give a list its next chunk: its place in the pool."""
+    before = w.where[g, chunk]
+    w.meta[FREE] -= 1
+    w.where[g, chunk] = w.free[w.meta[FREE]]
+    if w.where[g, chunk] != before:  # a candidate may have been drawn for one of its slots
+        locate(w)
+    return np.int64(w.where[g, chunk]) << w.meta[CHUNK]
+
+
+@cold_piece
+def locate(w):
+    """Find the places of the candidates drawn ahead."""
+    for k in range(w.meta[NEXT], AHEAD):
+        w.place_one[k] = place_of_particle(w, w.one[k])
+        w.place_two[k] = place_of_particle(w, w.two[k])
+
+
+@piece
+def place_of_particle(w, one):
+    """Place of a particle, a number of class and slot; 0 if it is only counted."""
+    g = one >> SLOT_BITS
+    return place_of(w, g, one & SLOT) if is_list(w, g) else np.int64(0)
+
+
+@cold_piece
+def duplicate(w, g):
+    """Put every particle of a list in once more; there must be free chunks."""
+    bits = w.meta[CHUNK]
+    full, rest = w.number[g] >> bits, w.number[g] & ((1 << bits) - 1)
+    # full chunks are copied whole, and the one that is not full comes after them
+    partial = w.where[g, full]
+    for c in range(full):
+        end = _next_chunk(w, g, full + c)
+        start = np.int64(w.where[g, c]) << bits
+        for k in range(1 << bits):
+            w.pool[end + k] = w.pool[start + k]
+    w.number[g] = (2 * full << bits) + rest
+    if rest > 0:
+        w.where[g, 2 * full] = partial
+        for k in range(rest):
+            append(w, g, w.pool[(np.int64(partial) << bits) + k])
+    elif full > 0:
+        w.tail[g] = place_of(w, g, w.number[g] - 1)
