@@ -31,6 +31,7 @@ from .low_rank_store import (
     STAGE,
     TAIL,
     WANTED,
+    WIDEST,
     Work,
     double,
     make_visit,
@@ -40,6 +41,8 @@ from .majorants import Tables, fill_bounds, fitted, from_powers
 
 #: stages of a majorant that is found: one for each octave of the largest size
 _STAGES = 62
+#: sizes up to this one need four bytes
+_NARROW = np.iinfo(np.int32).max
 
 
 @dataclass(frozen=True)
@@ -112,7 +115,8 @@ class LowRank(Method):
         start = np.zeros((replicas, slots), np.int64)
         room = np.zeros((replicas, slots), np.int64)
         stored = [int(counts[sizes >= 2 << bits].sum()) for sizes, counts in populations]
-        pool = np.zeros((replicas, max(stored) + max(stored) // 2 + 16), np.int64)
+        kind = np.int32 if largest <= _NARROW else np.int64
+        pool = np.zeros((replicas, max(stored) + max(stored) // 2 + 16), kind)
         for r, (sizes, counts) in enumerate(populations):
             np.add.at(number[r], np.searchsorted(edges, sizes, side="right") - 1, counts)
             wide = sizes >= 2 << bits
@@ -127,6 +131,7 @@ class LowRank(Method):
         count[:, LARGEST] = [sizes[-1] for sizes, _ in populations]
         meta = np.zeros((replicas, METAS), np.int64)
         meta[:, STAGE], meta[:, TAIL] = -1, stored
+        meta[:, WIDEST] = np.iinfo(kind).max
         levels = levels_of(slots)
         factors = tables.factor.shape[2]
         return Work(
@@ -158,6 +163,9 @@ class LowRank(Method):
         meta[:, (POOL_NEEDED, SLOTS_NEEDED)] = 0
         if pool > work.pool.shape[1]:
             work = work._replace(pool=enlarged(work.pool, pool))
+        if state.sizes.max() > meta[0, WIDEST]:
+            meta[:, WIDEST] = np.iinfo(np.int64).max
+            work = work._replace(pool=work.pool.astype(np.int64))
         old = work.number.shape[1]
         if slots <= old:
             return work
@@ -217,7 +225,7 @@ class LowRank(Method):
 
     def bytes_per_replica(self, particles: int) -> int:
         """See `Method.bytes_per_replica`."""
-        return 12 * particles + 8 * 20 * (1 << self.bits) * 16
+        return 6 * particles + 8 * 20 * (1 << self.bits) * 16
 
 
 @dataclass(frozen=True)

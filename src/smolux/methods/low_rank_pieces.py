@@ -19,6 +19,7 @@ from .low_rank_store import (
     SLOTS_NEEDED,
     STAGE,
     WANTED,
+    WIDEST,
     counted,
     has_room,
     insert,
@@ -256,6 +257,8 @@ def update(s, w, gone, entries, p):
         c = slot_for(w, s.sizes[e])
         if c >= slots:
             w.meta[SLOTS_NEEDED] = c + 1
+            return False
+        if s.sizes[e] > w.meta[WIDEST]:
             return False
         if not has_room(w, c, s.counts[e]) and not make_room(s, w, c, s.counts[e]):
             return False

@@ -23,6 +23,7 @@ TAIL = 1  # end of the last stretch of the pool
 SLOTS_NEEDED = 2  # what `grow` is asked for
 POOL_NEEDED = 3
 WANTED = 4  # row of the tables that `supply_bound` is asked for
+WIDEST = 5  # sizes above this need a pool of wider entries
 METAS = 8
 
 
@@ -39,7 +40,7 @@ class Work(NamedTuple):
         Where their levels begin.
     start, room, order : int64 arrays of shape (R, C)
         The stretch of each slot; the slots by where their stretches begin, as of the last move.
-    pool : int64 array of shape (R, P)
+    pool : int32 or int64 array of shape (R, P)
         Sizes of the particles of the wider slots.
     chosen : int64 array of shape (R, 4)
         Slot and place of both partners of the pending event.
@@ -135,7 +136,7 @@ def counted(w):
 @piece
 def size_at(w, slot, place):
     """Size of a particle."""
-    return slot if slot < counted(w) else w.pool[w.start[slot] + place]
+    return slot if slot < counted(w) else np.int64(w.pool[w.start[slot] + place])
 
 
 @piece
@@ -263,8 +264,9 @@ def make_visit(tally):
                 largest = max(largest, np.int64(slot))
             elif n > 0:
                 for k in range(w.start[slot], w.start[slot] + n):
-                    tally(t, grid, w.pool[k], 1, p)
-                    largest = max(largest, w.pool[k])
+                    size = np.int64(w.pool[k])
+                    tally(t, grid, size, 1, p)
+                    largest = max(largest, size)
         return largest
 
     return visit
@@ -280,7 +282,7 @@ def rescan(s, w):
     largest = slot
     if slot >= counted(w):
         for k in range(w.start[slot], w.start[slot] + np.int64(w.number[slot])):
-            largest = max(largest, w.pool[k])
+            largest = max(largest, np.int64(w.pool[k]))
     s.count[LARGEST] = largest
 
 
