@@ -94,10 +94,10 @@ def test_ten_million_particles_follow_the_exact_solution() -> None:
 
 
 @pytest.mark.slow
-def test_sizes_beyond_32_bits_and_beyond_the_classes_of_the_start() -> None:
+@pytest.mark.parametrize("method", ["size-class", "low-rank"])
+def test_sizes_beyond_32_bits_and_beyond_the_classes_of_the_start(method: str) -> None:
     times = [1e3, 1e9, 1e12]
-    ds = sx.simulate(model(kernel(c=1.0)), times, method="size-class", particles=400, replicas=8,
-                     seed=2)  # fmt: skip
+    ds = sx.simulate(model(kernel(c=1.0)), times, method=method, particles=400, replicas=8, seed=2)
     clusters = ds["number_density"].values * np.array(times)
     error = clusters.std(axis=0, ddof=1) / np.sqrt(8)
     assert (np.abs(clusters.mean(axis=0) - 2.0 / (1.0 + 2.0 / np.array(times))) < 7 * error).all()
