@@ -1,0 +1,259 @@
+"""The inverse method, compiled: how a pair is drawn and the rates are kept."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..core import rng
+from ..core.compile import cold_piece, piece
+from ..core.loop import Pieces, note_bad, note_largest
+from ..core.state import FIRST, LARGEST, PARTICLES, SECOND, SINCE, STORED, TRIALS, VALUE, VOLUME
+from ..core.sums import find, find_large, shift, weigh
+from .inverse_store import double, lone, make_visit, pair, remove, seize, size_at, top_of, view
+
+#: events after which the sums are computed afresh, so that rounding does not pile up
+_REFRESH = 1 << 16
+
+
+@cold_piece
+def _first(s, w, small, x):
+    """Slot of the first particle, by its rate with all others."""
+    top, buckets = top_of(s, w), w.table.shape[1]
+    if x < small:
+        k = find(w.number, w.rate, 0, w.block, top, x)
+        if k >= 0:
+            return k
+    d = find_large(w.large_rate, s.count[STORED], x - small)
+    return buckets + d if d >= 0 else -1
+
+
+def _make_rates(rate: Any) -> tuple[Any, Any, Any, Any]:
+    @piece
+    def pair_rate(s, w, i, j, met, p):
+        """Rate of two sizes; 0 where the kernel gives none, which is noted if they have `met`."""
+        if i <= w.table.shape[1] and j <= w.table.shape[1]:
+            return w.table[i - 1, j - 1]
+        value = rate(float(i), float(j), *p)
+        if 0.0 <= value < math.inf:
+            return value
+        if met:
+            note_bad(s, i, j, value)
+        return 0.0
+
+    @cold_piece
+    def row_of(s, w, scratch, size, top, p):
+        """Row of the table with the rates of `size` with the sizes ``1 .. top``."""
+        buckets = w.table.shape[1]
+        if size <= buckets:
+            return size - 1
+        row = buckets + scratch
+        for k in range(top):
+            w.table[row, k] = pair_rate(s, w, np.int64(k + 1), size, w.number[k] > 0.0, p)
+        return np.int64(row)
+
+    @cold_piece
+    def own_rate(s, w, size, d, p):
+        """Rate of a particle with all others: a large one in place `d`, or one of a bucket (-1)."""
+        top = top_of(s, w)
+        total = weigh(w.number, w.table, row_of(s, w, 0, size, top, p), w.block, top)
+        met = d >= 0 or w.number[size - 1] > 0.0
+        for k in range(s.count[STORED]):
+            if k != d:
+                total += pair_rate(s, w, size, w.large[k], met, p)
+        return total if d >= 0 else total - w.table[size - 1, size - 1]
+
+    @cold_piece
+    def look(s, w, size):
+        """Note a pair of buckets that are present for which the kernel gives no rate."""
+        row = w.table.shape[1] + 2 + size
+        if w.number[size - 1] > 0.0:
+            for k in range(top_of(s, w)):
+                others = w.number[k] - (1.0 if k == size - 1 else 0.0)
+                if others > 0.0 and not 0.0 <= w.table[row, k] < math.inf:
+                    note_bad(s, size, np.int64(k + 1), w.table[row, k])
+
+    return pair_rate, row_of, own_rate, look
+
+
+def _make_draw(pair_rate: Any, row_of: Any) -> Any:
+    @cold_piece
+    def second(s, w, a, p):
+        """Slot of the second particle, by its rate with the first, which is left out."""
+        top, buckets, stored = top_of(s, w), w.table.shape[1], s.count[STORED]
+        size = size_at(w, a)
+        row = row_of(s, w, 0, size, top, p)
+        if a < buckets:
+            w.number[a] -= 1.0
+        small = weigh(w.number, w.table, row, w.block, top)
+        large = 0.0
+        for d in range(stored):
+            if buckets + d != a:
+                large += pair_rate(s, w, size, w.large[d], True, p)
+        x = rng.uniform(s.rng) * (small + large)
+        slot = find(w.number, w.table, row, w.block, top, x) if x < small else -1
+        if slot < 0:
+            x -= small
+            for d in range(stored):
+                weight = pair_rate(s, w, size, w.large[d], False, p)
+                if buckets + d != a and weight > 0.0:
+                    slot = buckets + d
+                    if x < weight:
+                        break
+                    x -= weight
+        if a < buckets:
+            w.number[a] += 1.0
+        return slot
+
+    @cold_piece
+    def draw(s, w, p, factor):
+        s.count[FIRST] = -1
+        s.count[TRIALS] += 1
+        if not 0.0 <= s.clock[VALUE] < math.inf:
+            return math.nan
+        small = weigh(w.number, w.rate, 0, w.block, top_of(s, w))
+        large = 0.0
+        for d in range(s.count[STORED]):
+            large += w.large_rate[d]
+        total = small + large
+        if s.count[PARTICLES] < 2 or total <= 0.0:
+            return math.inf
+        wait = rng.exponential(s.rng) * 2.0 * s.clock[VOLUME] / (total * factor)
+        a = _first(s, w, small, rng.uniform(s.rng) * total)
+        if a >= 0:
+            b = second(s, w, a, p)
+            if b >= 0:
+                s.count[FIRST], s.count[SECOND] = a, b
+        return wait
+
+    return draw
+
+
+def _make_update(pair_rate: Any, row_of: Any, own_rate: Any, look: Any) -> Any:
+    @cold_piece
+    def account(s, w, i, j, gone, size, count, p):
+        """Account in all rates for `gone` of `i` and `j` each and `count` new ones of `size`."""
+        top = top_of(s, w)
+        shift(
+            w.rate[0],
+            w.table,
+            row_of(s, w, 0, i, top, p),
+            row_of(s, w, 1, j, top, p),
+            gone,
+            row_of(s, w, 2, size, top, p),
+            float(count),
+            top,
+        )
+        for d in range(s.count[STORED]):
+            large = w.large[d]
+            w.large_rate[d] += count * pair_rate(s, w, size, large, True, p) - gone * (
+                pair_rate(s, w, i, large, False, p) + pair_rate(s, w, j, large, False, p)
+            )
+
+    @cold_piece
+    def arrive(s, w, size, count, p):
+        """Put `count` particles of `size` in, the rates of all others being up to date."""
+        buckets = w.table.shape[1]
+        s.count[PARTICLES] += count
+        if size <= buckets:
+            w.number[size - 1] += count
+            if w.table.shape[0] > buckets + 3:
+                look(s, w, size)
+            return
+        first = s.count[STORED]
+        for d in range(first, first + count):
+            w.large[d] = size
+        s.count[STORED] += count
+        own = own_rate(s, w, size, first, p)
+        for d in range(first, first + count):
+            w.large_rate[d] = own
+
+    @cold_piece
+    def reach(s, w, size, p):
+        """Raise the largest size to which rates are kept."""
+        old = top_of(s, w)
+        note_largest(s, size)
+        for k in range(old, top_of(s, w)):
+            w.rate[0, k] = 0.0
+        for k in range(old, top_of(s, w)):
+            w.rate[0, k] = own_rate(s, w, np.int64(k + 1), -1, p)
+
+    @cold_piece
+    def update(s, w, gone, entries, p):
+        if entries == 0:  # what is gone is accounted for beside what appears
+            s.sizes[0], s.counts[0] = 1, 0
+            entries = 1
+        buckets = w.table.shape[1]
+        needed = 0
+        for e in range(entries):
+            if s.sizes[e] > buckets:
+                needed += s.counts[e]
+        if s.count[STORED] + needed > w.large.shape[0]:
+            return False
+        for e in range(entries):
+            reach(s, w, s.sizes[e], p)
+        a, b = s.count[FIRST], s.count[SECOND]
+        i = j = np.int64(1)
+        if gone == 3:
+            i, j = pair(s, w)
+            # the last large particle moves into a gap: the later slot first, so the other stays
+            remove(s, w, max(a, b))
+            remove(s, w, min(a, b))
+        elif gone > 0:
+            one = a if gone == 1 else b
+            i = j = size_at(w, one)
+            remove(s, w, one)
+        # of both; half of either if it is one
+        share = 1.0 if gone == 3 else 0.5 if gone > 0 else 0.0
+        for e in range(entries):
+            account(s, w, i, j, share if e == 0 else 0.0, s.sizes[e], s.counts[e], p)
+            arrive(s, w, s.sizes[e], s.counts[e], p)
+        return True
+
+    return update
+
+
+def _make_prepare(own_rate: Any, look: Any) -> Any:
+    @cold_piece
+    def renew(s, w, p):
+        """Compute every rate afresh, and the largest size."""
+        largest = np.int64(0)
+        for k in range(w.table.shape[1]):
+            if w.number[k] > 0.0:
+                largest = np.int64(k + 1)
+        for d in range(s.count[STORED]):
+            largest = max(largest, w.large[d])
+        s.count[LARGEST] = largest
+        for k in range(top_of(s, w)):
+            w.rate[0, k] = own_rate(s, w, np.int64(k + 1), -1, p)
+            if w.table.shape[0] > w.table.shape[1] + 3:
+                look(s, w, np.int64(k + 1))
+        for d in range(s.count[STORED]):
+            w.large_rate[d] = own_rate(s, w, w.large[d], d, p)
+        s.count[SINCE] = 1
+
+    @piece
+    def prepare(s, w, p):
+        if s.count[SINCE] == 0 or s.count[SINCE] > _REFRESH:
+            renew(s, w, p)
+        return 0
+
+    return prepare
+
+
+def bind(rate: Any, tally: Any) -> Pieces:
+    """Bind the pieces to a rate and a way to count."""
+    pair_rate, row_of, own_rate, look = _make_rates(rate)
+    return Pieces(
+        view,
+        _make_draw(pair_rate, row_of),
+        pair,
+        _make_update(pair_rate, row_of, own_rate, look),
+        _make_prepare(own_rate, look),
+        double,
+        lone,
+        seize,
+        make_visit(tally),
+    )

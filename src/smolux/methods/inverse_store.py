@@ -1,0 +1,133 @@
+"""Particles as the inverse method holds them: counted by size, and one by one above."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.compile import cold_piece, piece
+from ..core.state import FIRST, LARGEST, PARTICLES, SECOND, SINCE, STORED
+
+
+class Work(NamedTuple):
+    """Buckets of equal particles for sizes up to B, one entry a particle above.
+
+    Slots below B are buckets, slot ``B + d`` is entry ``d`` of the large particles.
+
+    Attributes
+    ----------
+    number : float64 array of shape (R, B)
+        Particles in each bucket (whole numbers).
+    rate : float64 array of shape (R, 1, B)
+        Rate ``S_k`` of one particle of the bucket with all others; kept up to size
+        ``count[LARGEST]``.
+    block : float64 array of shape (R, B / 32)
+        Sums of ``number * rate`` over blocks.
+    large : int64 array of shape (R, capacity)
+        Sizes above B; the first ``count[STORED]`` are in use.
+    large_rate : float64 array of shape (R, capacity)
+    table : float64 array of shape (B + 3, B), or (2 B + 3, B)
+        Rates of bucket sizes with each other; three rows of scratch for larger sizes. If the
+        kernel gives no rate somewhere, zeros stand there, and its own values in the last B rows.
+    """
+
+    number: np.ndarray
+    rate: np.ndarray
+    block: np.ndarray
+    large: np.ndarray
+    large_rate: np.ndarray
+    table: np.ndarray
+
+
+@piece
+def view(w, r):
+    """Work arrays of one replica."""
+    return Work(w.number[r], w.rate[r], w.block[r], w.large[r], w.large_rate[r], w.table)
+
+
+@piece
+def top_of(s, w):
+    """How many buckets are in use: those up to the largest size."""
+    return min(s.count[LARGEST], w.table.shape[1])
+
+
+@piece
+def size_at(w, slot):
+    """Size of the particles in a slot."""
+    buckets = w.table.shape[1]
+    return np.int64(slot + 1) if slot < buckets else w.large[slot - buckets]
+
+
+@piece
+def pair(s, w):
+    """Sizes of the chosen pair."""
+    return size_at(w, s.count[FIRST]), size_at(w, s.count[SECOND])
+
+
+@cold_piece
+def lone(s, w, k):
+    """Slot and size of particle `k`."""
+    left, slot = float(k), 0
+    while slot < w.table.shape[1]:
+        if left < w.number[slot]:
+            return np.int64(slot), np.int64(slot + 1)
+        left -= w.number[slot]
+        slot += 1
+    place = slot + np.int64(left)
+    return place, size_at(w, place)
+
+
+@piece
+def seize(s, w, place):
+    """Make a particle the one that vanishes."""
+    s.count[FIRST] = place
+
+
+@piece
+def remove(s, w, slot):
+    """Take a particle out: the last of the large ones moves into a gap."""
+    buckets = w.table.shape[1]
+    if slot < buckets:
+        w.number[slot] -= 1.0
+    else:
+        s.count[STORED] -= 1
+        w.large[slot - buckets] = w.large[s.count[STORED]]
+        w.large_rate[slot - buckets] = w.large_rate[s.count[STORED]]
+    s.count[PARTICLES] -= 1
+
+
+@cold_piece
+def double(s, w):
+    """Put every particle in once more; the rates are then computed afresh."""
+    stored = s.count[STORED]
+    if 2 * stored > w.large.shape[0]:
+        return False
+    for k in range(w.table.shape[1]):
+        w.number[k] *= 2.0
+    for d in range(stored):
+        w.large[stored + d] = w.large[d]
+    s.count[STORED] *= 2
+    s.count[PARTICLES] *= 2
+    s.count[SINCE] = 0
+    return True
+
+
+@lru_cache(maxsize=64)
+def make_visit(tally: Any) -> Any:
+    """Bind the counting of all particles, for output."""
+
+    @cold_piece
+    def visit(s, w, t, grid, p):
+        largest = np.int64(0)
+        for k in range(w.table.shape[1]):
+            if w.number[k] > 0.0:
+                largest = np.int64(k + 1)
+                tally(t, grid, largest, np.int64(w.number[k]), p)
+        for d in range(s.count[STORED]):
+            tally(t, grid, w.large[d], 1, p)
+            largest = max(largest, w.large[d])
+        return largest
+
+    return visit
