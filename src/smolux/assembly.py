@@ -13,6 +13,7 @@ import numpy as np
 from .core import beside, rng
 from .core.burst import make_burst
 from .core.compile import digest, piece, user_piece
+from .core.lone import CEILING_BITS, Lone, bind_outcomes, bind_rates, make_lone
 from .core.loop import make_fire, make_loop, make_next_event
 from .core.record import tally_one
 from .core.slots import slot_edges
@@ -186,13 +187,13 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
         if pieces.burst is not None:
             burst = make_burst(pieces.burst, outcome, len(pairs), random)
         return make_loop(pieces, make_next_event(pieces.draw, burst), fire)
-    about = [beside.Lone(p.law, type(p).outcome, p.least, p.splits, p.opens) for p in lone]
+    about = [Lone(p.law, type(p).outcome, p.least, p.splits, p.opens) for p in lone]
     shape = len(pairs), len(lone), len(sources)
-    rate = beside.bind_rates(about)
-    draw_lone = beside.make_lone(pieces.lone, rate, shape[0], shape[1])
+    rate = bind_rates(about)
+    draw_lone = make_lone(pieces.lone, rate, shape[0], shape[1])
     choose = beside.make_choice(rate, _factors(_rates(lone)), _factors(_rates(sources)), *shape)
     fire = beside.make_fire(
-        pieces, outcome, factor, beside.bind_outcomes(about), choose, make_stands(weight),
+        pieces, outcome, factor, bind_outcomes(about), choose, make_stands(weight),
         make_replacement(weight), shape[0], shape[1],
     )  # fmt: skip
     next_event = beside.make_next_event(pieces.draw, draw_lone, pieces.seize, *shape)
@@ -318,7 +319,7 @@ def inflow(processes: Sequence[Process], weighting: Weighting) -> float:
 
 def _beside(processes: Sequence[Process], weighting: Weighting) -> tuple[Any, ...]:
     """Tables of single particles and of sources, see `smolux.core.state.Windows`."""
-    edges = slot_edges(beside.CEILING_BITS).astype(float)
+    edges = slot_edges(CEILING_BITS).astype(float)
     low, high = edges[1:-1], edges[2:] - 1.0
     lone = [p for p in processes if isinstance(p, LoneProcess)]
     ceiling = np.zeros((len(lone), len(edges) - 1))
