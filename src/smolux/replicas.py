@@ -74,8 +74,11 @@ class Group:
     budget: int = 10_000
 
     @classmethod
-    def start(cls, plan: Plan, first: int, count: int) -> Group:
-        """Draw the initial populations of the replicas ``first .. first + count - 1``."""
+    def start(cls, plan: Plan, first: int, count: int, loop: Any = None) -> Group:
+        """Draw the initial populations of the replicas ``first .. first + count - 1``.
+
+        The `loop` is that of a group before, if one had the same model, method and weighting.
+        """
         populations = initial_populations(plan, range(first, first + count))
         state = empty_state(plan, streams(plan.entropy, first, count))
         rates = rates_for(plan.model, plan.weighting)
@@ -86,11 +89,14 @@ class Group:
             state,
             work,
             windows_for(plan.model.processes, plan.times[-1], plan.weighting),
+            loop,
         )
 
     @classmethod
-    def of(cls, plan: Plan, first: int, state: State, work: Any, windows: Windows) -> Group:
-        """Start with these particles."""
+    def of(
+        cls, plan: Plan, first: int, state: State, work: Any, windows: Windows, loop: Any = None
+    ) -> Group:
+        """Start with these particles; see `start`."""
         count, processes = len(state.rng), plan.model.processes
         if plan.start.total > 0.0:  # what begins empty is not doubled
             state.count[:, DOUBLE_AT] = doubles_at(plan.population, plan.particles)
@@ -104,6 +110,7 @@ class Group:
             np.full(count, BUDGET, np.int64),
             windows,
             distribution=[[] for _ in range(count if plan.distribution else 0)],
+            loop=loop,
         )
 
     @property

@@ -164,9 +164,7 @@ class Divided:
             state.clock[0, RAISED:] = clock[RAISED:]
             state.count[0, WINDOW] = window
             method.use(work, state, learnt)
-            group = Group.of(plan, self.first, state, work, self.windows)
-            group.loop = loop
-            return group
+            return Group.of(plan, self.first, state, work, self.windows, loop)
 
         piles = list(pool.map(split, range(len(self.parts))))
         self.parts.clear()  # room for what follows

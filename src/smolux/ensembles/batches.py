@@ -114,13 +114,10 @@ class Sampler:
         """Start the replicas ``first .. first + count - 1``."""
         plan = self.plan
         if self._state is None or count != plan.replicas:
-            group = Group.start(plan, first, count)
-        else:
-            rng = streams(plan.entropy, first, count)
-            state = State(rng, *(array.copy() for array in self._state[1:]))
-            group = Group.of(plan, first, state, self._fresh(), self._windows)
-        group.loop = self._loop
-        return group
+            return Group.start(plan, first, count, self._loop)
+        rng = streams(plan.entropy, first, count)
+        state = State(rng, *(array.copy() for array in self._state[1:]))
+        return Group.of(plan, first, state, self._fresh(), self._windows, self._loop)
 
     def _fresh(self) -> Any:
         """Return the stores at the start: each thread has its own, and its tables fill up."""
