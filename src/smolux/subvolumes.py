@@ -147,7 +147,7 @@ class Divided:
         copies = self._doubling()
         used = max(1, min(self.plan.subvolumes, int(count[PARTICLES]) // LEAST))
         method, rates = plan.method, rates_for(plan.model, plan.weighting)
-        learnt = method.learnt(self.parts[0].work, self.parts[0].state)
+        learnt = [method.learnt(part.work, part.state) for part in self.parts]
         window = int(np.searchsorted(self.windows.edges, start, side="right")) - 1
         loop = self.parts[0].loop
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import linalg
 
 import smolux as sx
 from smolux.methods.size_class import SizeClass
@@ -117,6 +118,40 @@ def test_shattering_fills_the_lists_beyond_their_start() -> None:
     found = ds["number_density"].values
     error = found.std(axis=0, ddof=1) / np.sqrt(len(found))
     assert (np.abs(found.mean(axis=0) - exact) < 7 * error).all()  # Student, 7 degrees
+
+
+@pytest.mark.parametrize("method", ["size-class", pytest.param("low-rank", marks=pytest.mark.slow)])
+def test_debris_that_falls_into_one_class_finds_room(method: str) -> None:
+    largest, cluster = 1040, 60_000
+    debris = np.zeros(largest)
+    debris[0], debris[1024:] = 1e-6, 1.0  # some 116 pieces of 1025 to 1040 from two clusters
+    case = sx.Model(
+        kernel(c=float(cluster) ** -8, m=4.0),  # pieces hardly collide
+        [sx.processes.CollisionalFragmentation(1.0, list(debris))],
+        sx.initial.from_sizes({cluster: 1.0}),
+    )
+    ds = sx.simulate(case, [3.0], method=method, particles=16, replicas=16, seed=1,
+                     population="fixed-volume")  # fmt: skip
+    assert ds["particles"].values.min() > 200
+    assert (ds["moment"].sel(order=1) * ds["volume"] == 16 * cluster).all()
+
+
+@pytest.mark.parametrize("classes", [4, 16])
+def test_sizes_that_react_with_nothing(classes: int) -> None:
+    # only equal sizes: 1 1 1 1 -> 2 1 1 -> 2 2 -> 4, each class alone for some time
+    times, rates = np.array([0.5, 4.0]), (6 / 4, 1 / 4, 1 / 4)
+    ds = sx.simulate(
+        model(kernel(b=1.0, w=0.01)), times, method=SizeClass(classes), particles=4,
+        replicas=4000, seed=4, population="fixed-volume",
+    )  # fmt: skip
+    steps = np.zeros((4, 4))
+    for k, rate in enumerate(rates):
+        steps[k, k], steps[k, k + 1] = -rate, rate
+    for t, found in zip(times, ds["particles"].values.T, strict=True):
+        law = linalg.expm(t * steps)[0]
+        counts = np.array([(found == 4 - k).sum() for k in range(4)])
+        error = np.sqrt(len(found) * law * (1.0 - law))
+        assert (np.abs(counts - len(found) * law) < 4.5 * error).all()
 
 
 def test_the_number_of_classes_is_checked() -> None:

@@ -19,7 +19,7 @@ _SMALL = 16
 _REACHED = 20
 #: relative difference of K(i, j) and K(j, i) that rounding may explain
 _ASYMMETRY = 1e-9
-_LIMIT = "look for a division by zero, and limit what grows, as in exp(min(x, 700))"
+_LIMIT = "look for a division by zero, and limit what grows, as in exp(min(x, 500))"
 
 
 def sample_sizes(largest: float) -> Float:

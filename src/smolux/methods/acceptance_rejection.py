@@ -107,7 +107,7 @@ class AcceptanceRejection(Method):
             raise InputError(
                 f"the kernel has no finite bound for the sizes {smallest:.0f} to {largest:.0f}, "
                 f"which were reached at t = {state.clock[replica, TIME]:.6g}; limit what grows, as "
-                "in exp(min(x, 700)), or end earlier"
+                "in exp(min(x, 500)), or end earlier"
             )
         if work.majorant[low, high] == 0.0:  # no candidate would ever find a rate below zero
             value = float(rates.arrays(smallest, largest))

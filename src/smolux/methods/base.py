@@ -123,8 +123,8 @@ class Method:
         """Return what was found out so far that holds for other stores of one replica, or None."""
         return None
 
-    def use(self, work: Any, state: State, learnt: Any) -> None:
-        """Take over what `learnt` has returned for another store with the same rates."""
+    def use(self, work: Any, state: State, learnt: list[Any]) -> None:
+        """Take over what `learnt` has returned for other stores with the same rates."""
 
     def bytes_per_replica(self, particles: int) -> int:
         """Estimate the memory of one replica at its start."""

@@ -200,7 +200,7 @@ class LowRank(Method):
             raise InputError(
                 f"the kernel has no finite bound for the sizes 1 to {2 ** (stage + 1)}, which were "
                 f"reached at t = {state.clock[replica, TIME]:.6g}; limit what grows, as in "
-                "exp(min(x, 700)), or end earlier"
+                "exp(min(x, 500)), or end earlier"
             )
         fitted(upper, self.single).store(Tables(*(getattr(work, f) for f in Tables._fields)), stage)
         smallest, largest = (float(state.count[replica, k]) for k in (SMALLEST, LARGEST))

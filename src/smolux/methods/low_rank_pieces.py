@@ -252,7 +252,9 @@ def update(s, w, gone, entries, p):
     if entries == 0:  # what is gone is accounted for beside what appears
         s.sizes[0], s.counts[0] = 1, 0
         entries = 1
-    slots = w.number.shape[0]
+    slots, together = w.number.shape[0], np.int64(0)
+    for e in range(entries):
+        together += s.counts[e]  # they may all be of one slot
     for e in range(entries):
         c = slot_for(w, s.sizes[e])
         if c >= slots:
@@ -260,10 +262,10 @@ def update(s, w, gone, entries, p):
             return False
         if s.sizes[e] > w.meta[WIDEST]:
             return False
-        if not has_room(w, c, s.counts[e]) and not make_room(s, w, c, s.counts[e]):
+        if not has_room(w, c, together) and not make_room(s, w, c, together):
             return False
     for e in range(entries - 1):  # making room for one may have taken it from another
-        if not has_room(w, slot_for(w, s.sizes[e]), s.counts[e]):
+        if not has_room(w, slot_for(w, s.sizes[e]), together):
             w.meta[POOL_NEEDED] = 2 * w.pool.shape[0]
             return False
     a, b = _take_out(s, w, gone)

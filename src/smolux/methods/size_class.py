@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..core.loop import Pieces
+from ..core.loop import ROUNDING, Pieces
 from ..core.slots import slot_edges
-from ..core.state import PARTICLES, SINCE, TIME, State
+from ..core.state import MAJORANT, PARTICLES, SINCE, TIME, State
 from ..errors import InputError
 from . import size_class_pieces as pieces
 from .base import Int, Method, Rates, Words, enlarged, spread
@@ -91,7 +91,7 @@ class SizeClass(Method):
         top = min(max(mass, largest, 16).bit_length(), 61)
         block = _OCTAVES << bits
         classes = -(-(_class_of(1 << top, bits) + 1) // block) * block
-        work = _empty(replicas, classes, bits, chunk, int(total.max()), largest > _NARROW)
+        work = _empty(replicas, classes, bits, chunk, int(total.max()), largest > _NARROW, rates)
         state.count[:, PARTICLES] = total
         edges = slot_edges(bits)
         same = all(population is populations[0] for population in populations)
@@ -125,20 +125,21 @@ class SizeClass(Method):
         bits = int(work.meta[0, BITS])
         edges, block = slot_edges(bits), _OCTAVES << bits
         for start in range(0, largest + 1, block):
-            if np.isnan(work.low[start + 1, start + 1]):  # no other replica has asked for it
+            if np.isnan(work.low[0, start + 1, start + 1]):  # no other replica has asked for it
                 g, h = np.triu_indices(min(start + block, len(edges) - 1))
                 new = (h >= start) & (g >= 1)
                 g, h = g[new], h[new]
                 high, low = _bounds(rates, edges, g, h, 2 << bits)
-                work.high[g, h] = work.high[h, g] = high
-                work.low[g, h] = work.low[h, g] = low
-        if np.isnan(work.high[1 : largest + 1, 1 : largest + 1]).any():
+                work.high[:, g, h] = work.high[:, h, g] = high
+                work.low[:, g, h] = work.low[:, h, g] = low
+        summed = np.isfinite(state.clock[replica, MAJORANT])
+        if not summed or np.isnan(work.high[:, 1 : largest + 1, 1 : largest + 1]).any():
             smallest = int(edges[np.flatnonzero(number)[0]])
             raise InputError(
-                f"the kernel has no finite bound for the sizes {smallest} to "
-                f"{edges[largest + 1] - 1}, which were reached at "
-                f"t = {state.clock[replica, TIME]:.6g}; limit what grows, as in "
-                "exp(min(x, 700)), or end earlier"
+                f"the rates of the sizes {smallest} to {edges[largest + 1] - 1}, which were "
+                f"reached at t = {state.clock[replica, TIME]:.6g}, have no finite "
+                f"{'bound' if summed else 'sum'}; limit what grows, as in exp(min(x, 500)), "
+                "or end earlier"
             )
 
     def population(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
@@ -165,7 +166,7 @@ class SizeClass(Method):
             number[: len(pile.number)] += pile.number
         total, bits = int(number.sum()), piles[0].bits
         wide = max(pile.widest for pile in piles) > _NARROW
-        work = _empty(1, len(number), bits, _chunk(total), total, wide)
+        work = _empty(1, len(number), bits, _chunk(total), total, wide, rates)
         state.count[0, PARTICLES] = total
         collect(work, piles)
         work.before[:] = work.number
@@ -176,12 +177,17 @@ class SizeClass(Method):
         bits, span = (int(work.meta[0, k]) for k in (BITS, SPAN))
         return bits, span, int(state.count[0, SINCE]), work.flow[0], work.high, work.low
 
-    def use(self, work: Work, state: State, learnt: Any) -> None:
+    def use(self, work: Work, state: State, learnt: list[Any]) -> None:
         """See `Method.use`."""
-        bits, span, since, flow, high, low = learnt
-        if bits == work.meta[0, BITS]:
-            n = min(len(high), len(work.high))
-            work.high[:n, :n], work.low[:n, :n] = high[:n, :n], low[:n, :n]
+        learnt = [found for found in learnt if found[0] == work.meta[0, BITS]]
+        for _, _, _, _, high, low in learnt:
+            n = min(high.shape[1], work.high.shape[1])
+            own = work.high[:, :n, :n], work.low[:, :n, :n]
+            new = ~(own[0] >= high[:, :n, :n])  # unknown so far, or raised by another
+            own[0][new], own[1][new] = high[:, :n, :n][new], low[:, :n, :n][new]
+        if learnt:
+            _, span, since, flow, _, _ = learnt[0]
+            n = min(len(flow), work.flow.shape[1])
             work.meta[0, SPAN], state.count[0, SINCE] = span, since
             work.flow[0, :n] = flow[:n]
 
@@ -191,7 +197,7 @@ class SizeClass(Method):
         bits, chunk = self._bits(particles), _chunk(particles)
         classes = _class_of(2 * particles, bits) + (_OCTAVES << bits)
         lists = 4 * classes * ((particles >> chunk) + 2)
-        return 4 * particles + lists + 18 * classes**2 + (4 * classes << chunk)
+        return 4 * particles + lists + 26 * classes**2 + (4 * classes << chunk)
 
 
 def _chunk(particles: int) -> int:
@@ -203,7 +209,9 @@ def _class_of(size: int, bits: int) -> int:
     return int(np.searchsorted(slot_edges(bits), size, side="right")) - 1
 
 
-def _empty(replicas: int, classes: int, bits: int, chunk: int, particles: int, wide: bool) -> Work:
+def _empty(
+    replicas: int, classes: int, bits: int, chunk: int, particles: int, wide: bool, rates: Rates
+) -> Work:
     """Make arrays for this many classes, without particles."""
     # a class may hold all particles; every list may end in a chunk that is not full
     stride = (particles >> chunk) + 2
@@ -241,8 +249,8 @@ def _empty(replicas: int, classes: int, bits: int, chunk: int, particles: int, w
         column=zeros(AHEAD, np.int64),
         rest=zeros(AHEAD, np.uint64),
         wait=zeros(AHEAD, float),
-        high=np.full((classes, classes), np.nan),
-        low=np.full((classes, classes), np.nan),
+        high=np.full((1 if rates.rigorous else replicas, classes, classes), np.nan),
+        low=np.full((1 if rates.rigorous else replicas, classes, classes), np.nan),
     )
 
 
@@ -280,9 +288,9 @@ def _members(work: Work, r: int, g: int) -> Int:
 
 def _more_classes(work: Work, classes: int) -> Work:
     pairs = classes * (classes + 1) // 2
-    old = work.high.shape[0]
-    high, low = (np.full((classes, classes), np.nan) for _ in range(2))
-    high[:old, :old], low[:old, :old] = work.high, work.low
+    bounded, old, _ = work.high.shape
+    high, low = (np.full((bounded, classes, classes), np.nan) for _ in range(2))
+    high[:, :old, :old], low[:, :old, :old] = work.high, work.low
     where = np.zeros((len(work.meta), classes, work.where.shape[2]), np.int32)
     where[:, :old] = work.where
     by_class = {
@@ -318,8 +326,9 @@ def _bounds(rates: Rates, edges: Int, g: Int, h: Int, single: int) -> tuple[Any,
     a, b = edges[g].astype(float), (edges[g + 1] - 1).astype(float)
     c, d = edges[h].astype(float), (edges[h + 1] - 1).astype(float)
     high, least = np.empty(len(g)), np.empty(len(g))
-    whole = h < single  # one size each: the rate itself
-    high[whole] = least[whole] = rates.arrays(a[whole], c[whole])
+    whole = h < single  # one size each: the rate itself, as it may be rounded elsewhere
+    least[whole] = rates.arrays(a[whole], c[whole])
+    high[whole] = least[whole] * ROUNDING
     wide = ~whole
     least[wide], high[wide] = rates.bounds(a[wide], b[wide], c[wide], d[wide])
     if not rates.rigorous:

@@ -166,9 +166,11 @@ def _remove(w, gone, a, place_a, b, place_b):
 
 @piece
 def _update(s, w, gone, entries, p):
-    chunks = np.int64(0)
+    chunks = together = np.int64(0)
     for e in range(entries):
-        chunks += chunks_for(w, s.sizes[e], s.counts[e])
+        together += s.counts[e]
+    for e in range(entries):
+        chunks += chunks_for(w, s.sizes[e], s.counts[e], together)
     if chunks > w.meta[FREE]:
         return False
     if gone > 0:
@@ -194,7 +196,7 @@ def _hold(s, w, factor):
 
 @piece
 def _replace(w, held, a, b, gone, size, count):
-    if chunks_for(w, size, count) > w.meta[FREE]:
+    if chunks_for(w, size, count, count) > w.meta[FREE]:
         return NOT_PLAIN, held
     k = at(w.meta[NEXT] - 1)  # the candidate that was accepted
     _remove(w, gone, a, w.place_one[k], b, w.place_two[k])

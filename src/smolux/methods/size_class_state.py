@@ -70,9 +70,10 @@ class Work(NamedTuple):
         What is left of the random bits with which they were drawn.
     wait : float64 array of shape (R, AHEAD)
         Their waiting times, of mean 1.
-    high, low : float64 arrays of shape (G, G)
+    high, low : float64 arrays of shape (1 or R, G, G)
         Bounds of the rate for each pair of classes, the lower one as a share of the upper; `low` is
-        NaN until asked for, `high` also where there is no finite bound.
+        NaN until asked for, `high` also where there is no finite bound. All replicas share those
+        that are proved; those that are not are raised by the replica that finds a rate above them.
     """
 
     meta: np.ndarray
@@ -127,6 +128,6 @@ def view(w, r):
         w.column[r],
         w.rest[r],
         w.wait[r],
-        w.high,
-        w.low,
+        w.high[min(r, w.high.shape[0] - 1)],
+        w.low[min(r, w.low.shape[0] - 1)],
     )

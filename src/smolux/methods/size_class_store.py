@@ -37,14 +37,17 @@ def insert(w, size, count):
 
 
 @piece
-def chunks_for(w, size, count):
-    """Chunks that particles of one size may need; more than there are if they have no room."""
+def chunks_for(w, size, count, together):
+    """Chunks that particles of one size may need; more than there are if they have no room.
+
+    With `together` particles of all sizes, which may be of one class.
+    """
     g, bits = slot_of(size, w.meta[BITS]), w.meta[CHUNK]
     if g >= w.number.shape[0] or size > w.meta[WIDEST]:
         return w.meta[FREE] + 1
     if not is_list(w, g):
         return np.int64(0)
-    if (w.number[at(g)] + count) >> bits >= w.where.shape[1]:
+    if (w.number[at(g)] + together) >> bits >= w.where.shape[1]:
         return w.meta[FREE] + 1
     return (count >> bits) + 1
 

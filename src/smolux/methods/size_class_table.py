@@ -13,6 +13,9 @@ from ..core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
 from .size_class_lists import is_list
 from .size_class_state import AHEAD, BITS, BLOCK, CHUNK, NEXT, PAIRS, SHARE, SPAN, STALE
 
+#: standard deviations of what comes in for which there is room at most
+_WIDEST = 8.0
+
 
 @cold_piece
 def _rates_of_places(w, used):
@@ -51,7 +54,8 @@ def _give_room(s, w, used):
         come = (w.flow[g] / SHARE + 0.5) / (w.meta[SPAN] + 0.5 * used)
         gain = max(w.number[g] - w.before[g] - math.sqrt(come * since), 0.0) / since
         worth = table * whole / (events * w.weight[k])
-        spread = math.sqrt(2.0 * math.log(worth)) if worth > 1.0 else 0.0
+        # what meets nothing costs no candidates, and has room for any scatter that is seen
+        spread = min(math.sqrt(2.0 * math.log(worth)), _WIDEST) if worth > 1.0 else 0.0
         slack = events * gain + spread * math.sqrt(events * come)
         w.room[g] = w.number[g] + np.int64(slack + 0.5)
         if is_list(w, g):
@@ -62,7 +66,10 @@ def _give_room(s, w, used):
 
 @cold_piece
 def _weigh(s, w, used):
-    """Enter the pairs of classes and their rates into the table; whether their bounds are known."""
+    """Enter the pairs of classes and their rates into the table.
+
+    False if a bound is not known, or if their sum is beyond all numbers.
+    """
     pairs, total = 0, 0.0
     for k in range(used):
         g = w.queue[k]
@@ -79,7 +86,7 @@ def _weigh(s, w, used):
                 pairs += 1
     s.clock[MAJORANT] = total
     w.meta[PAIRS] = pairs
-    return True
+    return total < math.inf
 
 
 @cold_piece
