@@ -52,12 +52,12 @@ def test_the_estimate_is_near_what_a_run_needs(law: str, particles: int, end: fl
 
 def test_what_is_chosen_and_why_stands_in_the_result() -> None:
     ds = sx.simulate(
-        sx.Model(sx.kernels.Constant()), [1000.0], particles=10_000, replicas=2, seed=1
+        sx.Model(sx.kernels.Constant()), [1000.0], particles=10_000, replicas=8, seed=1
     )
     assert ds.attrs["method"] == "acceptance-rejection"
     assert "candidates an event" in ds.attrs["method_reason"]
     given = sx.simulate(
-        sx.Model(sx.kernels.Constant()), [1000.0], particles=10_000, replicas=2, seed=1,
+        sx.Model(sx.kernels.Constant()), [1000.0], particles=10_000, replicas=8, seed=1,
         method="acceptance-rejection",
     )  # fmt: skip
     assert given.attrs["method_reason"] == "asked for"

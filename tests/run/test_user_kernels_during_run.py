@@ -130,10 +130,6 @@ def test_bounds_that_do_not_hold_are_repaired(method: str, bounds: Any) -> None:
     sizes = re.search(r"at the sizes (\d+) and (\d+)", warning)
     assert sizes is not None
     assert 21 in map(int, sizes.groups())
-    # by the replica that found it: what others find, in one group or in several, is theirs
-    runs.assert_same(
-        simulate(8.0, method, bounds, workers=1), simulate(8.0, method, bounds, workers=2)
-    )
     # repaired, not ignored: the many collisions of this size take place
     a, b, plain = (float(x["n"].sel(size=21).mean()) for x in (ds, right, simulate(1.0, method)))
     assert abs(a - b) < 0.5 * (plain - b) + 1e-12
