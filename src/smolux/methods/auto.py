@@ -30,10 +30,10 @@ _PRESENT = 0.72
 _SHARES = (np.arange(64) + 0.5) / 64
 #: nanoseconds of acceptance-rejection: an event but for its candidates, a candidate by whether its
 #: rate is read or computed, and what a group of replicas costs besides, for its start and bounds
-_EVENT, _TRIAL, _CHEAP_TRIAL, _START = 5.0, 27.0, 20.0, 2.6e6
+_EVENT, _TRIAL, _CHEAP_TRIAL, _START = 5.0, 30.0, 20.0, 2.3e6
 #: of the size-class method, for which nearly every candidate is an event: an event, what tables add
 #: to it for few particles, and the start
-_CLASS_EVENT, _CLASS_FEW, _CLASS_START = 40.0, 8.0e4, 1.3e6
+_CLASS_EVENT, _CLASS_FEW, _CLASS_START = 40.0, 8.0e4, 1.7e6
 #: of the low-rank method, for a kernel that is one product of factors, or the sum of such a product
 #: and its transpose; with more products it is never the best
 _PRODUCT_EVENT, _PRODUCT_START = 155.0, 0.85e6
