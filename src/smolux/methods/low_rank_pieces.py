@@ -254,7 +254,8 @@ def update(s, w, gone, entries, p):
         entries = 1
     slots, together = w.number.shape[0], np.int64(0)
     for e in range(entries):
-        together += s.counts[e]  # they may all be of one slot
+        if slot_for(w, s.sizes[e]) >= counted(w):
+            together += s.counts[e]  # they may all be of one slot
     for e in range(entries):
         c = slot_for(w, s.sizes[e])
         if c >= slots:

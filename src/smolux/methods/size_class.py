@@ -221,6 +221,7 @@ def _empty(
     meta[:, NEXT], meta[:, STALE] = AHEAD, 1
     meta[:, WIDEST] = np.iinfo(np.int64).max if wide else _NARROW
     pairs = classes * (classes + 1) // 2
+    bounded = 1 if rates.rigorous else replicas
     free = np.tile(np.arange(chunks, dtype=np.int32)[::-1], (replicas, 1))
 
     def zeros(columns: int, kind: Any) -> Any:
@@ -249,8 +250,8 @@ def _empty(
         column=zeros(AHEAD, np.int64),
         rest=zeros(AHEAD, np.uint64),
         wait=zeros(AHEAD, float),
-        high=np.full((1 if rates.rigorous else replicas, classes, classes), np.nan),
-        low=np.full((1 if rates.rigorous else replicas, classes, classes), np.nan),
+        high=np.full((bounded, classes, classes), np.nan),
+        low=np.full((bounded, classes, classes), np.nan),
     )
 
 

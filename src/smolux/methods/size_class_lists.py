@@ -82,10 +82,21 @@ def locate(w):
 
 
 @piece
+def place_in(w, g, slot):
+    """Place of a slot of any class, 0 if it is only counted; without a branch."""
+    return place_of(w, g, slot if is_list(w, g) else 0)
+
+
+@piece
 def place_of_particle(w, one):
     """Place of a particle, a number of class and slot; 0 if it is only counted."""
-    g = one >> SLOT_BITS
-    return place_of(w, g, one & SLOT) if is_list(w, g) else np.int64(0)
+    return place_in(w, one >> SLOT_BITS, one & SLOT)
+
+
+@piece
+def size_of_particle(w, one):
+    """Size of a particle, a number of class and slot."""
+    return size_at(w, one >> SLOT_BITS, place_of_particle(w, one))
 
 
 @cold_piece

@@ -14,19 +14,15 @@ from ..core.loop import PATIENCE, Pieces, note_bad, repair
 from ..core.prefetch import prefetch
 from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, VOLUME
 from ..core.wide import upper_half
-from .size_class_lists import is_list, place_of, place_of_particle, size_at
+from .size_class_lists import place_in, place_of_particle, size_at, size_of_particle
 from .size_class_state import AHEAD, BLOCK, FREE, NEXT, PAIRS, SLOT, SLOT_BITS, STALE, view
-from .size_class_store import chunks_for, double, insert, make_visit, remove
+from .size_class_store import chunks_for, double, insert, listed, make_visit, remove
 from .size_class_table import prepare
 
 
 @piece
 def _pair(s, w):
-    a, b = s.count[FIRST], s.count[SECOND]
-    return (
-        size_at(w, a >> SLOT_BITS, place_of_particle(w, a)),
-        size_at(w, b >> SLOT_BITS, place_of_particle(w, b)),
-    )
+    return size_of_particle(w, s.count[FIRST]), size_of_particle(w, s.count[SECOND])
 
 
 @cold_piece
@@ -36,7 +32,7 @@ def _lone(s, w, k):
         k -= w.number[g]
         g += 1
     one = (g << SLOT_BITS) | k
-    return one, size_at(w, g, place_of_particle(w, one))
+    return one, size_of_particle(w, one)
 
 
 @piece
@@ -46,8 +42,8 @@ def _seize(s, w, place):
 
 @piece
 def _aim(w, g, slot):
-    """Place of a slot, of which the memory is asked for; without a branch."""
-    there = place_of(w, g, slot if is_list(w, g) else 0)
+    """Place of a slot, of which the memory is asked for."""
+    there = place_in(w, g, slot)
     prefetch(w.pool, there)
     return there
 
@@ -168,7 +164,7 @@ def _remove(w, gone, a, place_a, b, place_b):
 def _update(s, w, gone, entries, p):
     chunks = together = np.int64(0)
     for e in range(entries):
-        together += s.counts[e]
+        together += listed(w, s.sizes[e], s.counts[e])
     for e in range(entries):
         chunks += chunks_for(w, s.sizes[e], s.counts[e], together)
     if chunks > w.meta[FREE]:

@@ -37,10 +37,16 @@ def insert(w, size, count):
 
 
 @piece
+def listed(w, size, count):
+    """How many of so many particles of one size come into a list: all or none."""
+    return count if is_list(w, slot_of(size, w.meta[BITS])) else np.int64(0)
+
+
+@piece
 def chunks_for(w, size, count, together):
     """Chunks that particles of one size may need; more than there are if they have no room.
 
-    With `together` particles of all sizes, which may be of one class.
+    With `together` particles for lists, of all sizes, which may be of one class.
     """
     g, bits = slot_of(size, w.meta[BITS]), w.meta[CHUNK]
     if g >= w.number.shape[0] or size > w.meta[WIDEST]:
