@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,25 @@ _LONG = (
     "law/test_processes.py", "spatial/test_time_stepping.py", "core/test_compile_cache.py",
 )  # fmt: skip
 _made = pytest.StashKey[str]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--other-processor",
+        action="store_true",
+        help="let laws evaluated on arrays differ in the last bit, see tests/processor.py",
+    )
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _processor(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Change how laws are evaluated, if that is asked for."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.config.option.other_processor:
+            from processor import change
+
+            change(patch)
+        yield
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -16,7 +16,7 @@ from smolux import kernels
 from smolux.errors import InputError
 from smolux.kernels import KERNELS, Kernel
 
-#: by which an evaluation may differ between NumPy, Python and processors: some units in the last place
+#: some units in the last place: NumPy, Python and processors differ by so much
 ROUNDING = 1e-14
 
 quick = settings(max_examples=20, deadline=None, derandomize=True)
