@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from .content import digest, frozen, is_frozen
 from .core import beside, rng
 from .core.burst import make_burst
-from .core.compile import digest, piece, user_piece
+from .core.compile import piece, user_piece, why_not
 from .core.lone import CEILING_BITS, Lone, bind_outcomes, bind_rates, make_lone
 from .core.loop import make_fire, make_loop, make_next_event
 from .core.record import tally_one
@@ -158,6 +159,24 @@ def _key(model: Model, method: Method, weighting: Weighting) -> tuple[Any, ...]:
     return (type(method), *shape, *((type(p), p.splits) for p in lone), *map(digest, functions))
 
 
+def uncompilable(model: Model, weighting: Weighting) -> list[str]:
+    """Say which functions of the user Numba cannot compile, and what to do."""
+    _, lone, _ = _kinds(model)
+    given: list[tuple[str, Callable[..., Any], int]] = [
+        (f"the kernel {model.kernel.label}", model.kernel.rate, 2 + len(model.kernel.parameters)),
+        *((f"the rate of {p.name}", p.law, 2 if p.splits else 1) for p in lone),
+        *((f"the rate of {p.name} in time", p.factor.rate, 1) for p in model.processes),
+    ]
+    if weighting.weight is not None:
+        given.append(("the weight function", weighting.weight, 1))
+    return [
+        f"{what}: {reason}; write it with numbers, math, NumPy, branches and functions of these, "
+        "with arrays or tuples in place of lists and dicts, and return a number"
+        for what, function, arguments in given
+        if is_frozen(function) and (reason := why_not(function, arguments)) is not None
+    ]
+
+
 def loop_for(model: Model, method: Method, weighting: Weighting) -> Any:
     """Return the compiled loop, the same object for the same physics and method.
 
@@ -234,16 +253,14 @@ def _proved(kernel: Kernel, weighting: Weighting, rate: str) -> _Proved:
 
 def _bounds_of(kernel: Kernel, weighting: Weighting) -> Callable[..., tuple[Any, Any]]:
     try:
-        if kernel.fixed and weighting.fixed:
-            return _proved(kernel, weighting, digest(kernel.rate))
+        return _proved(kernel, weighting, digest(kernel.rate))
     except TypeError:  # parameters that have no hash
-        pass
-    return weighting.bounds(kernel)
+        return weighting.bounds(kernel)
 
 
 def rates_for(model: Model, weighting: Weighting) -> Rates:
     """Return what a method needs to know of the simulated rate."""
-    kernel = model.kernel
+    kernel, weighting = frozen(model.kernel), frozen(weighting)
     weighted = weighting.weight is not None
     return Rates(
         (*kernel.parameters, *weighting.parameters),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import builtins
 import inspect
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 from types import BuiltinFunctionType, FunctionType, SimpleNamespace
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .checks import is_number
+from .content import frozen
 from .errors import InputError, did_you_mean
 from .intervals import Interval
 
@@ -121,8 +122,7 @@ class Function:
 
     def scalar(self, arguments: tuple[float, ...], parameters: tuple[float, ...]) -> float:
         """Call with single numbers."""
-        with np.errstate(all="ignore"):
-            return float(self.function(*(np.float64(x) for x in arguments), *parameters))
+        return _scalar(frozen(self.function), arguments, parameters)
 
     def evaluate(self, arguments: tuple[ArrayLike, ...], parameters: tuple[float, ...]) -> Float:
         """Call with arrays: at once if the function allows it, else entry by entry.
@@ -134,7 +134,8 @@ class Function:
         flat = [np.ascontiguousarray(x).ravel() for x in arrays]
         result = self._at_once(flat, parameters)
         if result is None:
-            values = [self.scalar(entry, parameters) for entry in zip(*flat, strict=True)]
+            now = frozen(self.function)
+            values = [_scalar(now, entry, parameters) for entry in zip(*flat, strict=True)]
             result = np.array(values, float)
         return result.reshape(arrays[0].shape)
 
@@ -142,9 +143,10 @@ class Function:
         size = flat[0].size
         if size < _COMPARED:
             return None
+        now = frozen(self.function)
         try:
             with np.errstate(all="ignore"):
-                found = np.asarray(_for_arrays(self.function)(*flat, *parameters))
+                found = np.asarray(_for_arrays(now)(*flat, *parameters))
             if found.shape not in ((), (size,)) or found.dtype.kind not in "fiub":
                 return None
             result = np.array(np.broadcast_to(found, (size,)), float)
@@ -153,7 +155,7 @@ class Function:
         # Spread by the golden ratio: never in step with the rows of a matrix.
         spread = np.modf(np.arange(1, _COMPARED) * 0.6180339887498949)[0] * size
         index = np.concatenate([spread.astype(int), [0, size - 1]])
-        single = [self.scalar(tuple(x[k] for x in flat), parameters) for k in index]
+        single = [_scalar(now, tuple(x[k] for x in flat), parameters) for k in index]
         same = np.allclose(result[index], single, rtol=1e-9, atol=0.0, equal_nan=True)
         return result if same else None
 
@@ -166,7 +168,7 @@ class Function:
             If the function compares its arguments or calls what intervals do not follow.
         """
         try:
-            found = _for_arrays(self.function)(*arguments, *parameters)
+            found = _for_arrays(frozen(self.function))(*arguments, *parameters)
         except Exception as error:
             raise TypeError(f"{self.text} cannot be followed: {error}") from error
         if isinstance(found, Interval):
@@ -176,6 +178,13 @@ class Function:
         raise TypeError(f"{self.text} cannot be followed: it returned {type(found).__name__}")
 
 
+def _scalar(
+    function: Callable[..., Any], arguments: Iterable[float], parameters: tuple[float, ...]
+) -> float:
+    with np.errstate(all="ignore"):
+        return float(function(*(np.float64(x) for x in arguments), *parameters))
+
+
 def wrong_number(value: Any, where: str) -> list[str]:
     """Return a message unless the value is a finite number."""
     if not is_number(value):
@@ -183,31 +192,13 @@ def wrong_number(value: Any, where: str) -> list[str]:
     return [] if np.isfinite(value) else [f"{where} = {value!r}: must be a finite number"]
 
 
-def _for_arrays(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Copy a function so that `math`, `min` and `max` work on arrays and intervals.
-
-    The functions that it calls by a global name are copied likewise. A global that is given another
-    value, as in a notebook, makes another copy.
-    """
-    return _copied(function, tuple(_globals(function, {})))
-
-
 @lru_cache(maxsize=256)
-def _copied(function: FunctionType, _: tuple[int, ...]) -> Callable[..., Any]:
-    return _copy(function, {})  # which holds the globals, so that their addresses stay theirs
+def _for_arrays(function: FunctionType) -> Callable[..., Any]:
+    """Copy a frozen function so that `math`, `min` and `max` work on arrays and intervals.
 
-
-def _globals(function: Any, done: dict[FunctionType, None]) -> Iterator[int]:
-    """Addresses of the global values that a function reaches."""
-    if function in done:
-        return
-    done[function] = None
-    for name in function.__code__.co_names:
-        value = function.__globals__.get(name)
-        called = getattr(value, "py_func", value)
-        yield id(value)
-        if isinstance(called, FunctionType) and not called.__module__.startswith("numpy"):
-            yield from _globals(called, done)
+    The functions that it calls by a global name are copied likewise.
+    """
+    return _copy(function, {})
 
 
 def _copy(function: FunctionType, done: dict[FunctionType, FunctionType]) -> FunctionType:

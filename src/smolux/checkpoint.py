@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from .content import frozen
 from .core.state import State, Tally, Windows
 from .errors import InputError, did_you_mean
 from .files import replacing
@@ -78,7 +79,7 @@ def _plan_from_dict(given: dict[str, Any], model: Model | None) -> Plan:
     values = dict(given)
     stored = values.pop("model")
     return Plan(
-        model=model if model is not None else model_from_dict(stored),
+        model=frozen(model) if model is not None else model_from_dict(stored),
         times=tuple(values.pop("times")),
         method=named(values.pop("method"), METHODS, "method"),
         weighting=named(values.pop("weighting"), WEIGHTINGS, "weighting"),

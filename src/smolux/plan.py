@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+import pickle
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from .assembly import inflow, rates_for
 from .checks import is_number, whole
+from .content import frozen
 from .core.state import Grid
 from .errors import InputError, did_you_mean
 from .goal import Goal, make_goal
@@ -59,6 +61,13 @@ class Plan:
     #: why the weighting was chosen, if it was
     weighting_reason: str = ""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by value: frozen functions are found in no module."""
+        import cloudpickle
+
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return _unpickled, (cloudpickle.dumps(values),)
+
     @cached_property
     def start(self) -> Initial:
         """The law of the simulated particles at the start: ``z_k = w(k) n_k``."""
@@ -98,6 +107,10 @@ class Plan:
         together = max(1, 200_000 // self.particles) if self.subvolumes == 1 else 1
         each = max(1, min(together, -(-(self.replicas - start) // max(workers, 1))))
         return [(r, min(each, self.replicas - r)) for r in range(start, self.replicas, each)]
+
+
+def _unpickled(values: bytes) -> Plan:
+    return Plan(**frozen(pickle.loads(values)))
 
 
 def make_plan(
@@ -167,8 +180,9 @@ def make_plan(
     )
     if problems:
         raise InputError(problems)
+    found["weighting"] = frozen(found["weighting"])
     plan = Plan(
-        model=model,
+        model=frozen(model),
         times=output,
         population=population,
         entropy=int(entropy),  # type: ignore[arg-type]

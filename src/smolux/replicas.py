@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .assembly import factor_parameters, loop_for, rates_for, windows_for
+from .assembly import factor_parameters, loop_for, rates_for, uncompilable, windows_for
+from .core.compile import CompileError
 from .core.rng import streams
 from .core.state import (
     BAD_FACTOR,
@@ -132,7 +133,13 @@ class Group:
     def compile(self) -> None:
         """Compile the loop, or load it from the cache, before any clock runs."""
         start = time.perf_counter()
-        self._call(np.full(len(self.codes), DONE, np.int64), 0)
+        try:
+            self._call(np.full(len(self.codes), DONE, np.int64), 0)
+        except CompileError:
+            problems = uncompilable(self.plan.model, self.plan.weighting)
+            if not problems:
+                raise
+            raise InputError(problems) from None
         self.compile_seconds = time.perf_counter() - start
 
     def _call(self, codes: Int, budget: int) -> None:

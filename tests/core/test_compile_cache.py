@@ -18,8 +18,9 @@ import pytest
 
 import smolux as sx
 from smolux.assembly import loop_for
+from smolux.content import digest
 from smolux.core import compile as compiling
-from smolux.core.compile import cache_directory, digest, statistics
+from smolux.core.compile import cache_directory, statistics
 from smolux.weighting import WEIGHTINGS, Number
 
 #: a function with everything that an edit may touch
@@ -406,7 +407,7 @@ def test_the_digest_is_that_of_every_process(tmp_path: Path) -> None:
     script = (
         "import json, smolux as sx\n"
         "from smolux.assembly import loop_for\n"
-        "from smolux.core.compile import digest\n"
+        "from smolux.content import digest\n"
         "from smolux.weighting import Number\n"
         "def K(i, j):\n"
         "    return 1.0 if i + j in {2.0, 3.0, 5.0} else i + j\n"

@@ -19,6 +19,7 @@ import importlib
 import itertools
 import os
 import pickle
+import re
 import secrets
 import tempfile
 import types
@@ -29,6 +30,7 @@ from typing import Any
 import numba
 import numpy as np
 
+from ..content import INSTALLED, OPTIONS, digest, is_frozen, module_of
 from . import pipeline
 
 try:
@@ -93,113 +95,6 @@ def cache_directory() -> Path | None:
         return Path(base or Path.home() / ".cache") / "smolux"
     except RuntimeError:  # no home
         return None
-
-
-class _Digest:
-    """Digest of a function and of everything it reaches."""
-
-    def __init__(self) -> None:
-        self._hash = hashlib.sha256()
-        self._seen: dict[int, int] = {}
-        #: what is known by its address, which must not pass to another object
-        self._kept: list[Any] = []
-        self._taken: set[tuple[int, str]] = set()
-
-    def hexdigest(self) -> str:
-        return self._hash.hexdigest()
-
-    def add(self, value: Any) -> None:
-        if isinstance(value, numba.core.dispatcher.Dispatcher):
-            self._text("dispatcher")
-            for name, option in sorted(value.targetoptions.items()):
-                self._text(name)
-                self.add(option)
-            self._function(value.py_func)
-        elif isinstance(value, types.FunctionType):
-            self._function(value)
-        elif isinstance(getattr(value, "_defn", None), types.FunctionType):  # an intrinsic
-            self._function(value._defn)
-        elif isinstance(value, types.CodeType):
-            self._code(value)
-        elif isinstance(value, types.ModuleType):
-            self._text(f"module {value.__name__} {getattr(value, '__version__', '')}")
-        elif isinstance(value, np.ndarray):
-            self._text(f"array {value.dtype} {value.shape}")
-            self._hash.update(np.ascontiguousarray(value).tobytes())
-        elif isinstance(value, (set, frozenset)):  # their order differs between processes
-            self.add(sorted(value, key=repr))
-        elif isinstance(value, (tuple, list)):
-            self._text(f"{type(value).__name__} {len(value)}")
-            for item in value:
-                self.add(item)
-        elif isinstance(value, type):
-            self._text(
-                f"type {value.__module__}.{value.__qualname__} {getattr(value, '_fields', '')}"
-            )
-        elif type(value).__module__.startswith("numba.") and hasattr(value, "__wrapped__"):
-            self._text(type(value).__name__)  # of numba.vectorize, numba.cfunc
-            self.add(value.__wrapped__)
-        else:  # numbers, strings, None, builtins: their text says it all
-            name = getattr(value, "__qualname__", None)
-            home = getattr(value, "__module__", "")
-            self._text(f"{type(value).__name__} {f'{home}.{name}' if name else repr(value)}")
-
-    def _text(self, text: str) -> None:
-        self._hash.update(text.encode() + b"\0")
-
-    def _code(self, code: types.CodeType) -> None:
-        self._hash.update(code.co_code)
-        self._text(f"{code.co_names} {code.co_varnames} {code.co_freevars} {code.co_cellvars}")
-        for constant in code.co_consts:
-            self.add(constant)
-
-    def _function(self, fn: types.FunctionType) -> None:
-        if id(fn) in self._seen:
-            self._text(f"again {self._seen[id(fn)]}")
-            return
-        self._seen[id(fn)] = len(self._seen)
-        self._kept.append(fn)
-        self._code(fn.__code__)
-        self.add(fn.__defaults__ or ())
-        names = _names(fn.__code__)
-        for cell in fn.__closure__ or ():
-            self._reached(cell.cell_contents, names)
-        for name in names:
-            if name in fn.__globals__:
-                self._text(f"global {name}")
-                self._reached(fn.__globals__[name], names)
-
-    def _reached(self, value: Any, names: list[str]) -> None:
-        """Add a value; of a module of the user also what may be taken from it by one of `names`."""
-        self.add(value)
-        if isinstance(value, types.ModuleType) and not _installed(value):
-            for name in names:
-                # each function may take something else from the same module
-                if hasattr(value, name) and (id(value), name) not in self._taken:
-                    self._taken.add((id(value), name))
-                    self._kept.append(value)
-                    self._text(f"attribute {name}")
-                    self._reached(getattr(value, name), names)
-
-
-def _names(code: types.CodeType) -> list[str]:
-    names = list(code.co_names)
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            names += _names(constant)
-    return names
-
-
-def _installed(module: types.ModuleType) -> bool:
-    """Whether a module's version speaks for its content."""
-    return module.__name__.partition(".")[0] in {"numpy", "math", "numba", "scipy"}
-
-
-def digest(fn: Callable[..., Any]) -> str:
-    """Digest of everything that decides the machine code of a function."""
-    d = _Digest()
-    d.add(fn)
-    return d.hexdigest()
 
 
 if _HOOKS:
@@ -306,8 +201,74 @@ def cold_piece(fn: Callable[..., Any]) -> Any:
 
 
 def user_piece(fn: Callable[..., Any]) -> Any:
-    """Compile a function of the user, who may allocate."""
-    return piece(fn, forceinline=False, **dict.fromkeys(_NO_COUNTING, True))
+    """Compile a function of the user, who may allocate; of a frozen one, with what it calls."""
+    if not is_frozen(fn):
+        return _allocating(fn)
+    found = _linked(fn, {})
+
+    @_allocating
+    def number(*arguments):
+        return 1.0 * found(*arguments)  # also of a truth value
+
+    return number
+
+
+def _allocating(fn: Callable[..., Any], **options: Any) -> Any:
+    return piece(fn, forceinline=False, **dict.fromkeys(_NO_COUNTING, True), **options)
+
+
+#: options of a user's own compiled function that decide its numbers
+_KEPT = ("fastmath", "error_model", "boundscheck")
+
+
+def _linked(fn: Any, done: dict[int, Any]) -> Any:
+    """Compile a frozen function and, as parts of it, the functions that it reads."""
+    if id(fn) in done:
+        return done[id(fn)]
+    space: dict[str, Any] = {}
+    cells = tuple(types.CellType() for _ in fn.__closure__ or ())
+    new = types.FunctionType(fn.__code__, space, fn.__name__, fn.__defaults__, cells)
+    new.__qualname__, new.__module__ = fn.__qualname__, fn.__module__
+    given = getattr(fn, OPTIONS, {})
+    made = done[id(fn)] = _allocating(new, **{k: given[k] for k in _KEPT if k in given})
+
+    def link(value: Any) -> Any:
+        if is_frozen(value):
+            return _linked(value, done)
+        if isinstance(value, types.ModuleType) and module_of(value) not in INSTALLED:
+            copy = types.ModuleType(value.__name__)
+            vars(copy).update({k: link(v) for k, v in vars(value).items()})
+            return copy
+        return value
+
+    space.update({name: link(value) for name, value in fn.__globals__.items()})
+    for cell, old in zip(cells, fn.__closure__ or (), strict=True):
+        cell.cell_contents = link(old.cell_contents)
+    return made
+
+
+def why_not(fn: Callable[..., Any], arguments: int) -> str | None:
+    """Say why Numba cannot compile a function of so many numbers; None if it can."""
+    try:
+        found = _linked(fn, {})
+        found.compile((numba.float64,) * arguments)
+        made = found.nopython_signatures[0].return_type
+    except CompileError as error:
+        lines = [x.strip() for x in _COLOURS.sub("", str(error)).splitlines() if x.strip()]
+        reasons = [x for x in lines if not x.startswith(_NOISE)]
+        places = [x for x in lines if x.startswith("File ")]
+        where = f" ({places[-1].rstrip(':')})" if places else ""
+        return f"{reasons[0] if reasons else type(error).__name__}{where}"
+    if not isinstance(made, (numba.types.Number, numba.types.Boolean)):
+        return f"it returns {made}, not a number"
+    return None
+
+
+#: raised where a function cannot be compiled
+CompileError = numba.core.errors.NumbaError
+
+_COLOURS = re.compile(r"\x1b\[[0-9;]*m")
+_NOISE = ("Failed in nopython", "During:", "File ", ">>>", "- Resolution")
 
 
 def entry(fn: Callable[..., Any]) -> Any:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..content import frozen
 from ..errors import InputError, Interrupted, SmoluxWarning
 from ..model import Model
 from ..results import to_dataset
@@ -150,6 +151,7 @@ def solve(
     settings = check(
         model, times, method, tolerance, largest, max_size, orders, sizes, bins_per_octave, gel
     )
+    model = frozen(model)
     started = time.perf_counter()
     run = _Run(model, settings, progress)
     try:

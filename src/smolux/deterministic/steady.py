@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 from scipy.sparse import linalg as krylov
 
+from ..content import frozen
 from ..errors import InputError
 from ..model import Model
 from ..processes import Aggregation
@@ -184,6 +185,7 @@ def steady_state(
     C. T. Kelley and D. E. Keyes, SIAM J. Numer. Anal. 35, 508 (1998),
     doi:10.1137/S0036142996304796.
     """
+    model = frozen(model)
     varying = [p.name for p in model.processes if p.factor.constant is None]
     if varying:
         raise InputError(

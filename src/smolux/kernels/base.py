@@ -49,8 +49,6 @@ class Kernel:
     cheap: ClassVar[bool] = False
     #: whether `bounds` is proved (interval arithmetic or analysis) or only sampled
     rigorous: ClassVar[bool] = True
-    #: whether `bounds` follow from the parameters alone, not from what else a function may read
-    fixed: ClassVar[bool] = True
     #: key of the closed-form solution in `smolux.exact`, for monodisperse starts
     exact: ClassVar[str | None] = None
 

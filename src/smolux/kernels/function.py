@@ -28,7 +28,6 @@ class FunctionKernel(Kernel):
     declared_degree: float | None = None
     declared_gels: bool | None = None
     name: ClassVar[str] = "function"
-    fixed: ClassVar[bool] = False
 
     def __repr__(self) -> str:
         given = ", ".join(f"{n}={v!r}" for n, v in zip(self.user.names, self.values, strict=True))

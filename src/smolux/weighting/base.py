@@ -66,11 +66,6 @@ class Weighting:
         """Whether bounds of the simulated rate are proved where those of the kernel are."""
         return True
 
-    @property
-    def fixed(self) -> bool:
-        """Whether bounds follow from the parameters alone, see `smolux.kernels.base.Kernel`."""
-        return True
-
     def weights(self, sizes: ArrayLike) -> Float:
         """Evaluate w on an array of sizes."""
         assert self.weight is not None

@@ -122,11 +122,6 @@ class WeightFunction(Weighting):
         """See `Weighting.rigorous`."""
         return self.exponent is not None or self._law.rigorous
 
-    @property
-    def fixed(self) -> bool:
-        """See `Weighting.fixed`."""
-        return not callable(self.w)
-
     def weights(self, sizes: ArrayLike) -> Float:
         """See `Weighting.weights`."""
         if self.exponent is not None:
