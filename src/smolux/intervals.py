@@ -132,7 +132,7 @@ class Interval:
             ends = [np.power(x, y) for x in base for y in (o.lo, o.hi)]
         lo = np.minimum(np.minimum(ends[0], ends[1]), np.minimum(ends[2], ends[3]))
         hi = np.maximum(np.maximum(ends[0], ends[1]), np.maximum(ends[2], ends[3]))
-        return _wider(lo, hi, least=0.0)
+        return _with_negative_base(self, o, _wider(lo, hi, least=0.0))
 
     def __rpow__(self, other: Any) -> Any:
         return Interval(other) ** self
@@ -193,6 +193,20 @@ def _integer_power(x: Interval, n: int) -> Interval:
         lo, hi = np.power(x.lo, float(n)), np.power(x.hi, float(n))
     wide = _wider(lo, hi)
     return Interval(np.where(x.lo >= 0, np.maximum(wide.lo, 0.0), wide.lo), wide.hi)
+
+
+def _with_negative_base(x: Interval, y: Interval, found: Interval) -> Interval:
+    """Add to a power what it is below zero: there it is defined for whole exponents only."""
+    negative = (x.lo < 0) & (np.floor(y.hi) >= np.ceil(y.lo))
+    if not negative.any():
+        return found
+    # as large as a power of the absolute value, of either sign; far more is not needed
+    size = Interval(np.where(negative, np.maximum(-x.hi, 0.0), 1.0), np.where(negative, -x.lo, 1.0))
+    most = (size**y).hi
+    alone = x.hi < 0  # else `found` bounds what it is from zero on
+    lo = np.where(alone, -most, np.minimum(found.lo, -most))
+    hi = np.where(alone, most, np.maximum(found.hi, most))
+    return Interval(np.where(negative, lo, found.lo), np.where(negative, hi, found.hi))
 
 
 def _increasing(

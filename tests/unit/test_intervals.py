@@ -215,3 +215,19 @@ def test_equal_lengths_and_limits() -> None:
     rough = subdivided(FUNCTIONS["corner"], 1, 1e6, 1, 1e6, 1, work=0)[1]
     fine = subdivided(FUNCTIONS["corner"], 1, 1e6, 1, 1e6)[1]
     assert fine <= 0.6 * rough
+
+
+@pytest.mark.parametrize(
+    ("base", "exponent"),
+    [((-3.0, 2.0), (2.0, 2.0)), ((-3.0, -2.0), (1.0, 3.0)), ((-3.0, -1.0), (-2.0, 0.5))],
+)
+def test_a_negative_base_has_its_powers_of_whole_exponents(
+    base: tuple[float, float], exponent: tuple[float, float]
+) -> None:
+    found = Interval(*base) ** Interval(*exponent)
+    x = np.linspace(*base, 51)
+    for n in range(int(np.ceil(exponent[0])), int(np.floor(exponent[1])) + 1):
+        powers = x[x != 0.0] ** float(n)
+        assert (found.lo <= powers).all()
+        assert (powers <= found.hi).all()
+    assert np.isfinite(found.hi)
