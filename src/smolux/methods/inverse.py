@@ -81,6 +81,7 @@ class Inverse(Method):
             large,
             np.zeros(large.shape),
             table if valid.all() else np.vstack((table, given)),
+            np.zeros((replicas, 1)),
         )
 
     def grow(self, work: Work, state: State) -> Work:

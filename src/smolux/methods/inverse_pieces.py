@@ -16,6 +16,9 @@ from .inverse_store import double, lone, make_visit, pair, remove, seize, size_a
 
 #: events after which the sums are computed afresh, so that rounding does not pile up
 _REFRESH = 1 << 16
+#: the same, when the sum of all has fallen to this share of what it was: what was subtracted from it
+#: leaves rounding that is then no longer small
+_FALL = 1e-8
 
 
 @cold_piece
@@ -58,12 +61,17 @@ def _make_rates(rate: Any) -> tuple[Any, Any, Any, Any]:
     def own_rate(s, w, size, d, p):
         """Rate of a particle with all others: a large one in place `d`, or one of a bucket (-1)."""
         top = top_of(s, w)
-        total = weigh(w.number, w.table, row_of(s, w, 0, size, top, p), w.block, top)
         met = d >= 0 or w.number[size - 1] > 0.0
+        row = row_of(s, w, 0, size, top, p)
+        if d < 0:  # left out, not subtracted: its rate with itself may exceed all others
+            w.number[size - 1] -= 1.0
+        total = weigh(w.number, w.table, row, w.block, top)
+        if d < 0:
+            w.number[size - 1] += 1.0
         for k in range(s.count[STORED]):
             if k != d:
                 total += pair_rate(s, w, size, w.large[k], met, p)
-        return total if d >= 0 else total - w.table[size - 1, size - 1]
+        return total
 
     @cold_piece
     def look(s, w, size):
@@ -78,7 +86,30 @@ def _make_rates(rate: Any) -> tuple[Any, Any, Any, Any]:
     return pair_rate, row_of, own_rate, look
 
 
-def _make_draw(pair_rate: Any, row_of: Any) -> Any:
+def _make_total(renew: Any) -> Any:
+    @piece
+    def summed(s, w):
+        """Sum of all rates: of the buckets, and of the large particles."""
+        small = weigh(w.number, w.rate, 0, w.block, top_of(s, w))
+        large = 0.0
+        for d in range(s.count[STORED]):
+            large += w.large_rate[d]
+        return small, large
+
+    @piece
+    def total_of(s, w, p):
+        """Sum the rates, which are computed afresh if the sum has fallen far."""
+        small, large = summed(s, w)
+        if small + large < _FALL * w.peak[0]:
+            renew(s, w, p)
+            small, large = summed(s, w)
+        w.peak[0] = max(w.peak[0], small + large)
+        return small, large
+
+    return total_of
+
+
+def _make_draw(pair_rate: Any, row_of: Any, total_of: Any) -> Any:
     @cold_piece
     def second(s, w, a, p):
         """Slot of the second particle, by its rate with the first, which is left out."""
@@ -113,10 +144,7 @@ def _make_draw(pair_rate: Any, row_of: Any) -> Any:
         s.count[TRIALS] += 1
         if not 0.0 <= s.clock[VALUE] < math.inf:
             return math.nan
-        small = weigh(w.number, w.rate, 0, w.block, top_of(s, w))
-        large = 0.0
-        for d in range(s.count[STORED]):
-            large += w.large_rate[d]
+        small, large = total_of(s, w, p)
         total = small + large
         if s.count[PARTICLES] < 2 or total <= 0.0:
             return math.inf
@@ -159,6 +187,8 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any, look: Any) -> Any:
         s.count[PARTICLES] += count
         if size <= buckets:
             w.number[size - 1] += count
+            if w.number[size - 1] == count:  # the first: its rate with itself was subtracted
+                w.rate[0, size - 1] = own_rate(s, w, size, -1, p)
             if w.table.shape[0] > buckets + 3:
                 look(s, w, size)
             return
@@ -215,7 +245,7 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any, look: Any) -> Any:
     return update
 
 
-def _make_prepare(own_rate: Any, look: Any) -> Any:
+def _make_renew(own_rate: Any, look: Any) -> Any:
     @cold_piece
     def renew(s, w, p):
         """Compute every rate afresh, and the largest size."""
@@ -233,7 +263,12 @@ def _make_prepare(own_rate: Any, look: Any) -> Any:
         for d in range(s.count[STORED]):
             w.large_rate[d] = own_rate(s, w, w.large[d], d, p)
         s.count[SINCE] = 1
+        w.peak[0] = 0.0
 
+    return renew
+
+
+def _make_prepare(renew: Any) -> Any:
     @piece
     def prepare(s, w, p):
         if s.count[SINCE] == 0 or s.count[SINCE] > _REFRESH:
@@ -246,12 +281,13 @@ def _make_prepare(own_rate: Any, look: Any) -> Any:
 def bind(rate: Any, tally: Any) -> Pieces:
     """Bind the pieces to a rate and a way to count."""
     pair_rate, row_of, own_rate, look = _make_rates(rate)
+    renew = _make_renew(own_rate, look)
     return Pieces(
         view,
-        _make_draw(pair_rate, row_of),
+        _make_draw(pair_rate, row_of, _make_total(renew)),
         pair,
         _make_update(pair_rate, row_of, own_rate, look),
-        _make_prepare(own_rate, look),
+        _make_prepare(renew),
         double,
         lone,
         seize,

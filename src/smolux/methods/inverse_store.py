@@ -31,6 +31,8 @@ class Work(NamedTuple):
     table : float64 array of shape (B + 3, B), or (2 B + 3, B)
         Rates of bucket sizes with each other; three rows of scratch for larger sizes. If the
         kernel gives no rate somewhere, zeros stand there, and its own values in the last B rows.
+    peak : float64 array of shape (R, 1)
+        Largest sum of all rates since they were computed afresh.
     """
 
     number: np.ndarray
@@ -39,12 +41,13 @@ class Work(NamedTuple):
     large: np.ndarray
     large_rate: np.ndarray
     table: np.ndarray
+    peak: np.ndarray
 
 
 @piece
 def view(w, r):
     """Work arrays of one replica."""
-    return Work(w.number[r], w.rate[r], w.block[r], w.large[r], w.large_rate[r], w.table)
+    return Work(w.number[r], w.rate[r], w.block[r], w.large[r], w.large_rate[r], w.table, w.peak[r])
 
 
 @piece
