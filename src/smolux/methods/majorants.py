@@ -19,6 +19,9 @@ _PAIRS = 4000
 #: a term of less than this share in every pair is left out
 _SMALL_SHARE = 1e-9
 _SWEEPS = 4
+#: bounds below this share of the largest are raised to it: bounds of a rate of zero may be no more
+#: than rounding, of which nothing can be made a multiple
+_LEAST = 1e-150
 
 
 class Tables(NamedTuple):
@@ -140,6 +143,7 @@ def fitted(upper: Float, single: bool) -> Found:
         Whether only one product of equal factors is wanted.
     """
     one = np.ones((1, len(upper)))
+    upper = np.where(upper > 0.0, np.maximum(upper, _LEAST * upper.max()), 0.0)
     if single or not upper.any():
         return _scaled(Found(one, np.array([0.5]), np.zeros((1, 2), np.int64)), upper)
     diagonal = np.sqrt(np.diag(upper))
