@@ -12,7 +12,7 @@ from ..core import rng
 from ..core.burst import NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
 from ..core.levels import renew_majorant
-from ..core.loop import PATIENCE, Pieces, note_bad, note_largest, repair
+from ..core.loop import PATIENCE, ROUNDING, Pieces, note_bad, note_largest, repair
 from ..core.prefetch import prefetch
 from ..core.state import (
     FIRST,
@@ -141,7 +141,8 @@ def _make_find(rate: Any) -> Any:
                 if not 0.0 <= value < math.inf:
                     note_bad(s, i, j, value)
                     return math.nan, a, b, i, j, trials, c0, c1, c2, c3
-                repair(s, i, j, value)
+                if value > majorant * ROUNDING:
+                    repair(s, i, j, value)
             if value >= majorant:
                 return waited * unit, a, b, i, j, trials, c0, c1, c2, c3
             u, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)

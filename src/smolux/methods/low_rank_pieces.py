@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core import rng
 from ..core.compile import cold_piece, piece
-from ..core.loop import PATIENCE, note_bad, repair
+from ..core.loop import PATIENCE, ROUNDING, note_bad, repair
 from ..core.prefetch import prefetch
 from ..core.segment_tree import add, build, find, find_mixed
 from ..core.slots import octave
@@ -32,9 +32,6 @@ from .low_rank_store import (
 
 #: a particle is a number of this many bits within its slot, and the slot above them
 _PLACE_BITS = 44
-#: a rate above its majorant by no more than rounding breaks no bound
-_ROUNDING = 1.0 + 1e-12
-
 
 #: sums are kept below this number of quanta, so that a uniform number can tell them all apart
 _MOST = 1 << 52
@@ -170,7 +167,7 @@ def make_draw(rate: Any) -> Any:
         i, j = pair(s, w)
         value = rate(float(i), float(j), *p)
         majorant = raised * _majorant(w, stage, a, b)
-        if not 0.0 <= value <= majorant * _ROUNDING:
+        if not 0.0 <= value <= majorant * ROUNDING:
             if not 0.0 <= value < math.inf:
                 note_bad(s, i, j, value)
                 return -1

@@ -10,7 +10,7 @@ import numpy as np
 from ..core import alias, rng
 from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
-from ..core.loop import PATIENCE, Pieces, note_bad, repair
+from ..core.loop import PATIENCE, ROUNDING, Pieces, note_bad, repair
 from ..core.prefetch import prefetch
 from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, VOLUME
 from ..core.wide import upper_half
@@ -98,7 +98,8 @@ def _make_find(rate: Any) -> Any:
             if not 0.0 <= value < math.inf:
                 note_bad(s, i, j, value)
                 return -1
-            _raise_bound(s, w, g, h, i, j, value)
+            if value > w.high[at(g), at(h)] * ROUNDING:
+                _raise_bound(s, w, g, h, i, j, value)
             return 1
         u = alias.remainder(w.table, np.uint64(column), w.rest[at(k)])
         return 1 if u * w.high[at(g), at(h)] < value else 0
@@ -125,6 +126,9 @@ def _make_find(rate: Any) -> Any:
                 return math.nan, one, two, i, j, trials, c0, c1, c2, c3
             if taken == 1:
                 return waited * held[0], one, two, i, j, trials, c0, c1, c2, c3
+        w.meta[STALE] = (
+            1  # candidates are for places that are empty by now, if nearly all are in vain
+        )
         return waited * held[0], -1, -1, 0, 0, trials, c0, c1, c2, c3
 
     return find

@@ -25,9 +25,11 @@ def _rates_of_places(w, used):
         g = w.queue[k]
         total = 0.0
         for m in range(used):
-            total += w.number[w.queue[m]] * w.high[g, w.queue[m]]
-        w.weight[k] = total
-        whole += 0.5 * w.number[g] * total
+            if m != k:
+                total += w.number[w.queue[m]] * w.high[g, w.queue[m]]
+        # a particle does not meet itself: that of a lone giant with itself may exceed all others
+        whole += 0.5 * w.number[g] * (total + max(w.number[g] - 1, 0) * w.high[g, g])
+        w.weight[k] = total + w.number[g] * w.high[g, g]
     return whole
 
 
@@ -79,7 +81,7 @@ def _weigh(s, w, used):
             weight = half * float(w.room[g]) * float(w.room[h]) * w.high[g, h]
             if math.isnan(weight):
                 return False
-            if weight > 0.0:
+            if weight > 0.0 and (g != h or w.room[g] > 1):  # with room for one, there is no pair
                 w.weight[pairs] = weight
                 w.classes[pairs] = (g << 16) | h
                 total += weight
