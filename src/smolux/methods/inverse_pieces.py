@@ -16,8 +16,8 @@ from .inverse_store import double, lone, make_visit, pair, remove, seize, size_a
 
 #: events after which the sums are computed afresh, so that rounding does not pile up
 _REFRESH = 1 << 16
-#: the same, when the sum of all has fallen to this share of what it was: what was subtracted from it
-#: leaves rounding that is then no longer small
+#: the same, when the sum of all has fallen to this share of what it was: what rounding has left of
+#: what was subtracted is then no longer small
 _FALL = 1e-8
 
 
