@@ -40,6 +40,8 @@ from .weighting.base import Weighting
 #: windows of time for bounds of a factor that varies: pieces of each octave, first octave
 _PIECES = 4
 _FIRST_OCTAVE = -20
+#: share of the bounds beside it that a bound found by trial has at least
+_NEIGHBOUR = 1 / 16
 
 
 @lru_cache(maxsize=64)
@@ -296,8 +298,12 @@ def _edges(end: float) -> list[float]:
 @lru_cache(maxsize=32)
 def _bounds(factor: TimeFunction, end: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
     edges = _edges(end)
-    pairs = [factor.bounds(a, b) for a, b in pairwise(edges)]
-    return tuple(edges), tuple(upper for _, upper in pairs)
+    upper = np.array([factor.bounds(a, b)[1] for a, b in pairwise(edges)])
+    if not factor.rigorous:
+        # A bound of zero would never be repaired, as nothing would be tried: zeros prove nothing.
+        beside = np.maximum(np.append(upper[1:], 0.0), np.append(0.0, upper[:-1]))
+        upper = np.maximum(upper, _NEIGHBOUR * beside)
+    return tuple(edges), tuple(upper.tolist())
 
 
 def windows_for(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import contextlib
 import inspect
 import math
 from collections.abc import Callable, Iterable
@@ -183,6 +184,45 @@ def _scalar(
 ) -> float:
     with np.errstate(all="ignore"):
         return float(function(*(np.float64(x) for x in arguments), *parameters))
+
+
+def numbers_of(function: Callable[..., Any], most: int = 4096) -> Float:
+    """Return the numbers that a function reads, ascending: where its branches and tables change.
+
+    Constants, defaults, and what is in its closure and its globals, and in the functions that it
+    calls by a global name; arrays and lists of numbers, too, unless there are more than `most`.
+    """
+    found: set[float] = set()
+    _collect(function, found, set(), most)
+    return np.array(sorted(found))
+
+
+def _collect(value: Any, found: set[float], done: set[int], most: int) -> None:
+    called = getattr(value, "py_func", value)
+    if isinstance(called, FunctionType):
+        if id(called) in done or (called.__module__ or "").startswith("numpy"):
+            return
+        done.add(id(called))
+        reached = inspect.getclosurevars(called)
+        held = [*called.__code__.co_consts, *(called.__defaults__ or ())]
+        for inner in (*held, *reached.nonlocals.values(), *reached.globals.values()):
+            _collect(inner, found, done, most)
+    elif is_number(value):
+        found |= {abs(float(value))} if np.isfinite(value) else set()
+    elif isinstance(value, (tuple, list, np.ndarray)) and 0 < len(np.atleast_1d(value)) <= most:
+        with contextlib.suppress(TypeError, ValueError):
+            entries = np.abs(np.asarray(value, float).ravel())
+            found |= set(entries[np.isfinite(entries)].tolist())
+
+
+def spread(count: int) -> Float:
+    """Return numbers in [0, 1] in no step with any period: both ends, even and irregular ones.
+
+    The same ones on every machine: PCG64 is defined to the bit.
+    """
+    golden = np.modf(np.arange(1, count) * 0.6180339887498949)[0]
+    random = np.random.Generator(np.random.PCG64(count)).random(count)
+    return np.concatenate([np.linspace(0.0, 1.0, count // 4 + 1), golden, random])
 
 
 def wrong_number(value: Any, where: str) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .boxes import subdivided
-from .callables import Function
+from .callables import Function, numbers_of, spread
 from .checks import is_number
 from .errors import InputError
 from .formula import Formula, parse
@@ -19,8 +19,10 @@ from .intervals import Interval
 Float = NDArray[np.float64]
 
 #: sizes at which a function that intervals do not follow is tried, and what is added then
-_SAMPLES = 17
+_SAMPLES = 48
 _SAFETY = 1.1
+#: ranges of fewer sizes than this are tried at every size
+_ALL = 257
 #: sizes at which a new function is looked at
 _TRIED = (1.0, 2.0, 3.0, 10.0, 100.0, 1000.0)
 
@@ -197,6 +199,8 @@ class SizeFunction:
         By interval arithmetic, else by trial with a margin; never below zero.
         """
         a, b = np.broadcast_arrays(np.asarray(a, float), np.asarray(b, float))
+        if self.values is not None:
+            return self._range(a, b)
         try:
             one = np.ones(a.shape)
             found = subdivided(lambda k, _: self.interval(k), a, b, one, one, 8, least=0.0)
@@ -210,18 +214,59 @@ class SizeFunction:
         return lower, upper
 
     def _sampled(self, a: Float, b: Float) -> tuple[Float, Float]:
-        share = np.linspace(0.0, 1.0, _SAMPLES)
-        low, high = a[..., None], b[..., None]
-        values = self(np.clip(np.rint(low * (high / low) ** share), low, high))
-        single = np.where(a == b, 1.0, _SAFETY)
-        with np.errstate(all="ignore"):
-            return np.nanmin(values, axis=-1) / single, np.nanmax(values, axis=-1) * single
+        assert self.user is not None or self.formula is not None
+        low, high = a.ravel(), b.ravel()
+        sizes, owner = _tried(low, high, self._numbers)
+        values = self(sizes)
+        least, most = np.full(len(low), np.inf), np.full(len(low), -np.inf)
+        good = ~np.isnan(values)
+        np.minimum.at(least, owner[good], values[good])
+        np.maximum.at(most, owner[good], values[good])
+        # Where every size was tried, nothing is left to guess.
+        single = np.where(high - low < _ALL, 1.0, _SAFETY)
+        return (least / single).reshape(a.shape), (most * single).reshape(a.shape)
+
+    @property
+    def _numbers(self) -> Float:
+        return np.empty(0) if self.user is None else numbers_of(self.user.function)
 
     def _range(self, low: Float, high: Float) -> tuple[Float, Float]:
         assert self.values is not None
-        values = np.array(self.values)
-        first = np.minimum(np.maximum(low, 1.0), len(values)).astype(np.int64) - 1
-        last = np.minimum(np.maximum(high, 1.0), len(values)).astype(np.int64)
-        parts = [values[a:b] for a, b in zip(first.ravel(), last.ravel(), strict=True)]
-        ends = np.array([(p.min(), p.max()) for p in parts]).reshape(*low.shape, 2)
-        return ends[..., 0], ends[..., 1]
+        # The last value holds beyond; once more, so that the end of a range is a place, too.
+        values = np.array((*self.values, self.values[-1]))
+        count = len(self.values)
+        first = np.clip(low, 1.0, count).astype(np.int64).ravel() - 1
+        last = np.clip(high, 1.0, count).astype(np.int64).ravel()
+        if not first.size:
+            return np.empty(low.shape), np.empty(low.shape)
+        places = np.stack([first, last], axis=1).ravel()
+        least = np.minimum.reduceat(values, places)[::2]
+        most = np.maximum.reduceat(values, places)[::2]
+        return least.reshape(low.shape), most.reshape(low.shape)
+
+
+def _tried(low: Float, high: Float, numbers: Float) -> tuple[Float, NDArray[np.int64]]:
+    """Sizes at which a function is tried over ranges of sizes, and the range of each.
+
+    Every whole size of a short range; of others the ends, sizes in no step with any period, and the
+    whole numbers at and next to those that the function reads.
+    """
+    sizes, owner = [low, high], [np.arange(len(low)), np.arange(len(low))]
+    short = np.flatnonzero(high - low < _ALL)
+    steps = np.arange(_ALL, dtype=float)
+    whole = np.minimum(low[short, None] + steps, high[short, None])
+    sizes.append(whole.ravel())
+    owner.append(np.repeat(short, len(steps)))
+    wide = np.flatnonzero(high - low >= _ALL)
+    share = spread(_SAMPLES)
+    between = low[wide, None] * (high / low)[wide, None] ** share
+    sizes.append(np.clip(np.rint(between), low[wide, None], high[wide, None]).ravel())
+    owner.append(np.repeat(wide, len(share)))
+    near = np.unique(np.concatenate([np.floor(numbers) + step for step in (-1.0, 0.0, 1.0, 2.0)]))
+    for k in wide:
+        inside = near[(near >= low[k]) & (near <= high[k])]
+        sizes.append(inside)
+        owner.append(np.full(len(inside), k))
+    pairs = np.stack([np.concatenate(owner).astype(float), np.concatenate(sizes)])
+    pairs = np.unique(pairs, axis=1)
+    return pairs[1], pairs[0].astype(np.int64)

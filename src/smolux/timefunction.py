@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .boxes import subdivided
-from .callables import Function
+from .callables import Function, numbers_of, spread
 from .checks import is_number
 from .errors import InputError
 from .formula import Formula, parse
@@ -18,8 +18,8 @@ from .intervals import Interval
 
 Float = NDArray[np.float64]
 
-#: times at which a function that intervals do not follow is tried
-_SAMPLES = 257
+#: how closely a function that intervals do not follow is tried, see `smolux.callables.spread`
+_SAMPLES = 128
 _MARGIN = 0.1
 #: a lower bound that is negative by no more than this share of the upper one is rounding
 _ROUNDING = 1e-12
@@ -156,7 +156,15 @@ class TimeFunction:
         return self.formula.interval(t=t)
 
     def _sampled(self, t0: float, t1: float) -> tuple[float, float]:
-        values = self(np.linspace(t0, t1, _SAMPLES))
+        assert self.user is not None
+        shares = spread(_SAMPLES)
+        numbers = numbers_of(self.user.function)
+        inside = numbers[(numbers >= t0) & (numbers <= t1)]
+        # Both sides of what the function compares with, and what lies between two of these.
+        edges = np.concatenate([inside, np.nextafter(inside, t0), np.nextafter(inside, t1)])
+        ends = np.unique(np.concatenate([[t0], inside, [t1]]))
+        between = 0.5 * (ends[1:] + ends[:-1])
+        values = self(np.concatenate([t0 + (t1 - t0) * shares, edges, between]))
         low, high = float(values.min()), float(values.max())
         margin = _MARGIN * (high - low)
         # A function that is not seen to be negative is not taken to be.

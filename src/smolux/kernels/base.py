@@ -134,6 +134,11 @@ class Kernel:
         """
         return None
 
+    @property
+    def singled_out(self) -> Float:
+        """Whole sizes that the law names, where it may differ from what it is beside them."""
+        return np.empty(0)
+
     def problems(self, largest: float = 1.0) -> list[str]:
         """Return what is wrong with the law on a sample of sizes.
 

@@ -34,7 +34,7 @@ def sample_sizes(largest: float) -> Float:
 def law_problems(kernel: Kernel, largest: float) -> list[str]:
     """Return what is wrong with a law; see `Kernel.problems`."""
     where = f"kernel {kernel.label}"
-    sizes = sample_sizes(largest)
+    sizes = np.unique(np.concatenate([sample_sizes(largest), kernel.singled_out]))
     i, j = (x.ravel() for x in np.meshgrid(sizes, sizes, indexing="ij"))
     order = np.argsort(np.maximum(i, j), kind="stable")  # the smallest sizes are named first
     i, j = i[order], j[order]

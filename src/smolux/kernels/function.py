@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smolux.callables import Function, wrong_number
+from smolux.callables import Function, numbers_of, wrong_number
 from smolux.errors import InputError
 from smolux.intervals import Interval
 
 from .base import Float, Kernel
-from .numeric import always_bounded, interval_bounds, sampled_bounds
+from .numeric import NUMBERS, always_bounded, interval_bounds, sampled_bounds
 
 
 @dataclass(frozen=True)
@@ -100,13 +100,25 @@ class FunctionKernel(Kernel):
         if self.declared_bounds is not None:
             return self._declared(self.declared_bounds, a, b, c, d)
         if not self._follows:
-            return sampled_bounds(self, a, b, c, d)
+            return self._sampled(a, b, c, d)
         lower, upper = interval_bounds(self._interval, a, b, c, d)
         found = np.isfinite(upper)
         if not found.all():
-            sampled = sampled_bounds(self, a, b, c, d)
+            sampled = self._sampled(a, b, c, d)
             lower, upper = np.where(found, lower, sampled[0]), np.where(found, upper, sampled[1])
         return lower, upper
+
+    @property
+    def singled_out(self) -> Float:
+        """See `Kernel.singled_out`; of the first numbers in the function."""
+        numbers = numbers_of(self.user.function)
+        whole = np.unique(np.rint(numbers[(numbers >= 1) & (numbers < 2.0**20)]))
+        return whole[:NUMBERS]
+
+    def _sampled(
+        self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike
+    ) -> tuple[Float, Float]:
+        return sampled_bounds(self, a, b, c, d, numbers_of(self.user.function))
 
     def _declared(self, bounds: Callable[..., Any], *box: ArrayLike) -> tuple[Float, Float]:
         sides = np.broadcast_arrays(*(np.asarray(x, float) for x in box))

@@ -1,0 +1,105 @@
+"""Laws that are known by their values only: what a sample must not step over."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from smolux import kernels
+from smolux.assembly import windows_for
+from smolux.processes import Evaporation, Removal
+from smolux.sizefunction import SizeFunction
+from smolux.timefunction import TimeFunction
+
+TABLE = np.array([0.0, 7.0, 7.01, 7.02, 100.0])
+VALUES = np.array([0.0, 0.0, 50.0, 0.0, 0.0])
+
+
+def spike(t: float) -> float:
+    return 1000.0 if 30 < t < 30.001 else 0.0
+
+
+def day_and_night(t: float) -> float:
+    return 1.0 if t % 1 > 0.5 else 0.0
+
+
+def table(t: float) -> float:
+    return float(np.interp(t, TABLE, VALUES))
+
+
+def one_size(k: float) -> float:
+    return 5.0 if k == 1030 else 0.0
+
+
+def one_large_size(k: float) -> float:
+    return 5.0 if k == 103000 else 0.0
+
+
+def one_sum(i: float, j: float) -> float:
+    return 1.0 if i + j == 1001 else 1e-9
+
+
+def one_pair(i: float, j: float) -> float:
+    return 1.0 if min(i, j) == 37 and max(i, j) == 41 else 0.0
+
+
+@pytest.mark.parametrize(
+    ("function", "window", "peak"),
+    [
+        (spike, (28, 32), 1000.0),
+        (day_and_night, (512, 640), 1.0),
+        (day_and_night, (1792, 2048), 1.0),
+        (table, (6, 8), 50.0),
+    ],
+)
+def test_functions_of_time(function: object, window: tuple[float, float], peak: float) -> None:
+    low, high = TimeFunction.of(function).bounds(*window)
+    assert low == 0
+    assert high >= peak
+
+
+def test_no_window_of_zero_beside_one_that_is_not() -> None:
+    """A bound of zero is never tried, and so never repaired."""
+    windows = windows_for([Removal(0.1, varying=spike)], 100.0)
+    upper, edges = windows.bounds[:, 0], windows.edges
+    peak = int(np.searchsorted(edges, 30.0)) - 1
+    assert upper[peak] >= 1000
+    assert upper[peak - 1] > 0
+    assert upper[peak + 1] > 0
+
+
+@pytest.mark.parametrize(
+    ("function", "low", "high"), [(one_size, 1024, 1151), (one_large_size, 98304, 106495)]
+)
+def test_functions_of_size(function: object, low: float, high: float) -> None:
+    bounds = SizeFunction.of(function, "rate").bounds([1.0, low], [1.0, high])
+    assert bounds[0].tolist() == [0.0, 0.0]
+    assert bounds[1][0] == 0
+    assert bounds[1][1] >= 5
+
+
+@pytest.mark.parametrize("process", [Removal, Evaporation])
+def test_ceilings(process: type) -> None:
+    ceiling = process(one_size).ceiling(np.array([896.0, 1024.0]), np.array([1023.0, 1151.0]))
+    assert ceiling[0] == 0
+    assert ceiling[1] >= 5
+
+
+def test_lists_are_bounded_exactly() -> None:
+    rng = np.random.default_rng(1)
+    values = rng.random(50)
+    low = rng.integers(1, 80, 200)
+    high = low + rng.integers(0, 60, 200)
+    lower, upper = SizeFunction.of(values, "rate").bounds(low, high)
+    for a, b, least, most in zip(low, high, lower, upper, strict=True):
+        inside = values[np.minimum(np.arange(a, b + 1), 50) - 1]
+        assert (least, most) == (inside.min(), inside.max())
+
+
+def test_kernels() -> None:
+    upper = kernels.from_function(one_sum).bounds([448, 1, 600], [511, 1, 700], 512, 575)[1]
+    assert upper[0] >= 1
+    assert (upper[1:] < 1e-8).all()
+    kernel = kernels.from_function(one_pair)
+    assert kernel.bounds(32, 40, 40, 47)[1] >= 1
+    assert kernel.problems() == []
