@@ -28,6 +28,9 @@ _LAZY = {
     **dict.fromkeys(
         (
             "analysis",
+            "case",
+            "conformance",
+            "deterministic",
             "ensembles",
             "exact",
             "initial",
@@ -52,6 +55,9 @@ __all__ = [
     "WorkerError",
     "__version__",
     "analysis",
+    "case",
+    "conformance",
+    "deterministic",
     "efficiency",
     "ensemble",
     "ensembles",
@@ -75,6 +81,9 @@ __all__ = [
 if TYPE_CHECKING:
     from . import (
         analysis,
+        case,
+        conformance,
+        deterministic,
         ensembles,
         exact,
         initial,

@@ -58,18 +58,42 @@ _COORDINATES = {
 }
 
 
-def _attribute(value: Any) -> str | int | float:
-    """Return what netCDF can hold: a text or a number; everything else becomes JSON text."""
+def _attribute(value: Any) -> Any:
+    """Return what netCDF can hold: a text, a number or numbers; all else becomes JSON text."""
     if isinstance(value, (bool, np.bool_)):
         return int(value)
-    if isinstance(value, (int, np.integer)):
+    if isinstance(value, (int, np.integer)) and not isinstance(value, np.timedelta64):
         # seeds have up to 128 bits
         return int(value) if -(2**63) <= value < 2**63 else str(value)
     if isinstance(value, (float, np.floating)):
         return float(value)
-    if isinstance(value, str):
+    if (
+        isinstance(value, np.ndarray)
+        and value.dtype.kind in "iuf"
+        and value.ndim == 1 <= value.size
+    ):
         return value
-    return json.dumps(value, default=str)
+    return _text(value)
+
+
+def _text(value: Any) -> str:
+    """Return a text that HDF5 takes: a text as it is, unless it is not valid; else JSON."""
+    if isinstance(value, str):
+        try:
+            if b"\0" not in value.encode():
+                return value
+        except UnicodeEncodeError:
+            pass
+    try:
+        return json.dumps(value, default=_listed)
+    except (TypeError, ValueError):  # keys that are no texts, or something within itself
+        return json.dumps(repr(value))
+
+
+def _listed(value: Any) -> Any:
+    """Return what JSON does not know as what it does: numbers of NumPy, else a text."""
+    known = isinstance(value, (np.ndarray, np.generic)) and value.dtype.kind not in "mM"
+    return value.tolist() if known else str(value)
 
 
 def _versions() -> dict[str, str]:
@@ -133,7 +157,7 @@ _RAGGED_NAMES = {
 }
 
 
-def provenance(title: str, given: Mapping[str, Any]) -> dict[str, str | int | float]:
+def provenance(title: str, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the attributes of a result: where it comes from, and all that is `given` about it."""
     own = {
         "Conventions": "CF-1.11",
@@ -148,7 +172,7 @@ def provenance(title: str, given: Mapping[str, Any]) -> dict[str, str | int | fl
     return {key: _attribute(value) for key, value in (own | known).items()}
 
 
-def _provenance(model: Model, records: Records) -> dict[str, str | int | float]:
+def _provenance(model: Model, records: Records) -> dict[str, Any]:
     own = {"model": model_to_dict(model), "warnings": list(records.warnings)}
     given = {k: v for k, v in records.attributes.items() if k != "units"}
     return provenance("Kinetics of aggregation and fragmentation", own | given)
@@ -270,6 +294,11 @@ def save(ds: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
     -------
     pathlib.Path
 
+    Notes
+    -----
+    Attributes that netCDF cannot hold are written as what it can: True as 1, None, lists and
+    dictionaries as JSON text.
+
     Raises
     ------
     InputError
@@ -277,19 +306,25 @@ def save(ds: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
     OSError
         If the disk is full or read-only; an old file stays as it was.
     """
-    attributes = {k: _attribute(v) for k, v in ds.attrs.items() if v is not None}
     # in memory first: HDF5 crashes the process when the disk fills up while it writes
     if isinstance(ds, xr.DataTree):
-        tree = ds.map_over_datasets(lambda node: node.drop_encoding())
-        tree.attrs = attributes
+        tree = ds.map_over_datasets(_writable)
         encodings = {node.path: _packing(node.to_dataset(inherit=False)) for node in tree.subtree}
         content = tree.to_netcdf(engine="h5netcdf", encoding=encodings)
     else:
-        ds = ds.assign_attrs(attributes).drop_encoding()
+        ds = _writable(ds)
         content = ds.to_netcdf(engine="h5netcdf", encoding=_packing(ds))
     with replacing(path) as temporary:
         temporary.write_bytes(content)
     return Path(path)
+
+
+def _writable(ds: xr.Dataset) -> xr.Dataset:
+    """Return a copy whose attributes, and those of its variables, are what netCDF can hold."""
+    ds = ds.drop_encoding()
+    for holder in (ds, *ds.variables.values()):
+        holder.attrs = {str(k): _attribute(v) for k, v in holder.attrs.items()}
+    return ds
 
 
 def _packing(ds: xr.Dataset) -> dict[Any, dict[str, Any]]:

@@ -39,15 +39,12 @@ class Dimension:
 TIME = Dimension("a time", "s", "10 s")
 LENGTH = Dimension("a length", "m", "50 nm")
 VOLUME = Dimension("a volume", "m^3", "1 um^3")
-MASS = Dimension("a mass", "kg", "1 fg")
 NUMBER_DENSITY = Dimension("a number per volume", "m^-3", "1e6 cm^-3")
 MASS_DENSITY = Dimension("a mass per volume", "kg/m^3", "1.2 g/cm^3")
 TEMPERATURE = Dimension("a temperature", "K", "298 K")
 VISCOSITY = Dimension("a dynamic viscosity", "Pa*s", "1.8e-5 Pa s")
-KINEMATIC_VISCOSITY = Dimension("a kinematic viscosity", "m^2/s", "1.5e-5 m^2/s")
 RATE = Dimension("a rate (one over a time)", "1/s", "100 1/s")
 ACCELERATION = Dimension("an acceleration", "m/s^2", "9.81 m/s^2")
-DISSIPATION = Dimension("an energy dissipation rate per mass", "m^2/s^3", "0.01 m^2/s^3")
 KERNEL = Dimension("a collision kernel (volume per time)", "m^3/s", "1e-9 cm^3/s")
 NONE = Dimension("a plain number", "", "0.5")
 
@@ -124,7 +121,8 @@ def _registry() -> Any:
     import pint
 
     # offset units (degC) mean a temperature here, never a difference of two
-    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True, cache_folder=":auto:")
+    # no cache on disk: Pint's holds the paths of the environment that filled it, for all of them
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
 
 
 def _tidy(value: float) -> float:

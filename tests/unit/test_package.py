@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.resources
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -65,6 +67,25 @@ def test_names_are_the_objects_they_stand_for():
     assert smolux.simulate.__module__ == "smolux.stochastic"
     assert smolux.solve.__module__ == "smolux.deterministic.solver"
     assert callable(smolux.summary)
+
+
+def test_every_name_of_the_reference_is_reached_from_the_package_alone():
+    page = Path(__file__).parents[2] / "docs" / "reference" / "api.md"
+    names, module = [], ""
+    for line in page.read_text(encoding="utf-8").splitlines():
+        if found := re.fullmatch(r"\.\. currentmodule:: smolux\.?([\w.]*)", line):
+            module = found[1] + "." if found[1] else ""
+        elif found := re.fullmatch(r"   ([A-Za-z_][\w.]*)", line):
+            names.append(module + found[1])
+    assert len(names) > 100
+    # one from each module by itself: what another has imported would be there by chance
+    first = {name.partition(".")[0] if "." in name else "": name for name in names}
+    for name in first.values():
+        subprocess.run([sys.executable, "-c", f"import smolux; smolux.{name}"], check=True)
+    subprocess.run(
+        [sys.executable, "-c", "import smolux\n" + "\n".join(f"smolux.{n}" for n in names)],
+        check=True,
+    )
 
 
 def test_unknown_name():

@@ -2,6 +2,7 @@
 
 import csv
 import errno
+import json
 import os
 import stat
 import subprocess
@@ -40,6 +41,52 @@ def test_round_trip_is_bit_for_bit(ds, tmp_path):
         assert back[name].values.tobytes() == ds[name].values.tobytes(), name
     assert all(type(back.attrs[k]) is type(v) for k, v in ds.attrs.items())
     assert names(tmp_path) == ["results.nc"]
+
+
+ODD = {
+    "flag": True,
+    "nothing": None,
+    "table": {"a": [1, None], "b": np.arange(2)},
+    "keys": {(1, 2): 3},
+    "array": np.array([0.5, 2.0]),
+    "matrix": np.eye(2),
+    "huge": 2**70,
+    "duration": np.timedelta64(3, "s"),
+    "bytes": "a\0b",
+    7: "a key that is a number",
+}
+WRITTEN = {
+    "flag": 1,
+    "nothing": "null",
+    "table": '{"a": [1, null], "b": [0, 1]}',
+    "keys": '"{(1, 2): 3}"',
+    "matrix": "[[1.0, 0.0], [0.0, 1.0]]",
+    "huge": str(2**70),
+    "duration": '"3 seconds"',
+    "bytes": json.dumps("a\0b"),
+    "7": "a key that is a number",
+}
+
+
+def test_any_attribute_is_written_wherever_it_is(ds, tmp_path):
+    for holder in (ds, ds["n"], ds["size"]):
+        holder.attrs |= ODD
+    back = results.load(results.save(ds, tmp_path / "results.nc"))
+    for holder in (back, back["n"], back["size"]):
+        assert {k: v for k, v in holder.attrs.items() if k in WRITTEN} == WRITTEN
+        np.testing.assert_array_equal(holder.attrs["array"], [0.5, 2.0])
+    np.testing.assert_array_equal(back["n"], ds["n"])
+    assert ds["n"].attrs["flag"] is True, "what is saved stays as it is"
+
+
+def test_any_attribute_of_a_group_is_written(ds, tmp_path):
+    tree = xr.DataTree.from_dict({"/": ds.assign_attrs(kind="spatial"), "/group": ds.copy()})
+    for holder in (tree, tree["group"], tree["group"].dataset["n"]):
+        holder.attrs |= ODD
+    tree["group"]["n"].attrs |= ODD
+    back = results.load(results.save(tree, tmp_path / "results.nc"))
+    for holder in (back, back["group"], back["group"]["n"]):
+        assert {k: v for k, v in holder.attrs.items() if k in WRITTEN} == WRITTEN
 
 
 def test_second_round_trip_and_units_of_time(tmp_path):

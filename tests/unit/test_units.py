@@ -69,3 +69,8 @@ def test_si_units_do_not_load_pint():
         "sys.exit('pint' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_units_do_not_depend_on_what_an_environment_left_on_the_disk():
+    """Pint's cache holds the paths of the environment that filled it."""
+    assert units._registry()._diskcache is None

@@ -31,13 +31,10 @@ FIELDS: dict[tuple[str, str], Dimension] = {
 ARGUMENTS: dict[str, Dimension] = {
     "temperature": units.TEMPERATURE,
     "viscosity": units.VISCOSITY,
-    "kinematic_viscosity": units.KINEMATIC_VISCOSITY,
-    "dissipation": units.DISSIPATION,
     "gradient": units.RATE,
     "gravity": units.ACCELERATION,
     "radius": units.LENGTH,
     "volume": units.VOLUME,
-    "mass": units.MASS,
     "density": units.MASS_DENSITY,
     "density_difference": units.MASS_DENSITY,
 }
@@ -245,10 +242,10 @@ def _processes(content: Any, problems: Problems) -> list[dict[str, Any]]:
             if value is None:
                 if f.default is MISSING:
                     table.require(f.name, words)
-            elif isinstance(value, (int, float, str)) and not isinstance(value, bool):
-                data[f.name] = value if isinstance(value, str) else float(value)
-            elif (isinstance(value, list) and "a list" in words) or (
-                isinstance(value, Mapping) and "a table" in words
+            elif (
+                (isinstance(value, (int, float, str)) and not isinstance(value, bool))
+                or (isinstance(value, list) and "a list" in words)
+                or (isinstance(value, Mapping) and "a table" in words)
             ):
                 data[f.name] = value
             else:
@@ -334,10 +331,10 @@ def _require_units(data: Mapping[str, Any], problems: Problems) -> None:
 def model_tables(model: Model, si: bool) -> dict[str, Any]:
     """Tables of a case file for a model, with units if it has them."""
     data = model_to_dict(model)
-    tables: dict[str, Any] = {"kernel": dict(data["kernel"])}
+    tables: dict[str, Any] = {"kernel": _given(data["kernel"])}
     if tables["kernel"]["name"] == "formula":
         del tables["kernel"]["name"]
-    tables["processes"] = [dict(p) for p in data["processes"]]
+    tables["processes"] = [_given(p) for p in data["processes"]]
     tables["initial"] = _initial_table(model.initial, data["initial"])
     if si:
         for (section, key), dimension in FIELDS.items():
@@ -349,8 +346,13 @@ def model_tables(model: Model, si: bool) -> dict[str, Any]:
     return tables
 
 
+def _given(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a table says: a key that was left out is None in Python, and TOML has no None."""
+    return {k: v for k, v in table.items() if v is not None}
+
+
 def _initial_table(initial: Initial, data: dict[str, Any]) -> dict[str, Any]:
     if isinstance(initial, Sizes) and len(initial.sizes) == 1:
         size, density = initial.sizes[0], initial.densities_[0]
         return {"name": "monodisperse", "size": size, "density": density}
-    return dict(data)
+    return _given(data)

@@ -21,8 +21,12 @@ def compare(
         Path | None, typer.Option("--figure", "-f", help="Draw the comparison into this file.")
     ] = None,
 ) -> None:
-    """Run a case by every method and the solver: differences in sigmas, and the time of each."""
+    """Run a case by every method and the solver: differences in sigmas, and the time of each.
+
+    Ends with 1 if a method differs.
+    """
     from ..case import load
     from . import comparing
 
-    comparing.run(load(case, sets or ()), method, figure)
+    if not comparing.run(load(case, sets or ()), method, figure):
+        raise typer.Exit(1)
