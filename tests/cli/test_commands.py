@@ -260,6 +260,14 @@ def test_compare_puts_methods_side_by_side(folder):
     assert "did you mean 'inverse'" in call("compare", "small.toml", "-m", "invers", code=2).stderr
 
 
+def test_compare_ends_with_1_if_a_method_differs(folder, monkeypatch):
+    from smolux.cli import comparing
+
+    for agree, code in ((False, 1), (True, 0)):
+        monkeypatch.setattr(comparing, "rows", lambda found, a=agree: (comparing.EXACT, [], a))
+        call("compare", "small.toml", "-m", "acceptance-rejection", code=code)
+
+
 def test_compare_against_the_solver_with_a_figure(folder):
     result = call(
         "compare", "small.toml", "-s", "initial.size=2", "-m", "solver", "-m",
