@@ -322,7 +322,8 @@ def save(ds: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
 def _writable(ds: xr.Dataset) -> xr.Dataset:
     """Return a copy whose attributes, and those of its variables, are what netCDF can hold."""
     ds = ds.drop_encoding()
-    for holder in (ds, *ds.variables.values()):
+    holders: list[Any] = [ds, *ds.variables.values()]
+    for holder in holders:
         holder.attrs = {str(k): _attribute(v) for k, v in holder.attrs.items()}
     return ds
 
