@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .assembly import inflow, rates_for
-from .checks import is_number, whole
+from .checks import is_number, numbers, whole
 from .content import frozen
 from .core.state import Grid
 from .errors import InputError, did_you_mean
@@ -294,9 +294,9 @@ def _orders(orders: Any, problems: list[str]) -> tuple[float, ...]:
 def check_times(times: ArrayLike, problems: list[str]) -> tuple[float, ...]:
     """Return output times as floats; add what is wrong with them to `problems`."""
     try:
-        output = np.atleast_1d(np.asarray(times, float))
-    except (TypeError, ValueError):
-        problems.append(f"times = {times!r}: must be a list of numbers")
+        output = np.atleast_1d(numbers("times", times))
+    except InputError as error:
+        problems += error.problems
         return ()
     if output.ndim != 1 or not output.size:
         problems.append(f"times = {times!r}: must be a list of at least one number")

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .boxes import subdivided
 from .callables import Function, numbers_of, spread
-from .checks import is_number
+from .checks import is_number, numbers
 from .errors import InputError
 from .formula import Formula, parse
 from .intervals import Interval
@@ -99,8 +99,8 @@ class SizeFunction:
             user = Function.of(given, (variable,), what)
             return cls(user.text, variable, user=user)
         try:
-            values = np.asarray(given, float)
-        except (TypeError, ValueError):
+            values = numbers(what, given)
+        except InputError:
             values = np.empty((0, 0))
         if values.ndim == 1 and values.size:
             listed = [f"{x:g}" for x in values[:4]] + ["..."] * (len(values) > 4)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import is_number
+from ..checks import is_number, numbers
 from ..errors import InputError, did_you_mean
 from ..model import Model
 from .operator import METHODS
@@ -143,9 +143,9 @@ def _whole(what: str, value: Any, least: int, problems: list[str]) -> int:
 
 def _times(times: ArrayLike, problems: list[str]) -> tuple[float, ...]:
     try:
-        output = np.atleast_1d(np.asarray(times, float))
-    except (TypeError, ValueError):
-        problems.append(f"times = {times!r}: must be a list of numbers")
+        output = np.atleast_1d(numbers("times", times))
+    except InputError as error:
+        problems += error.problems
         return ()
     if output.ndim != 1 or not output.size:
         problems.append(f"times = {times!r}: must be a list of at least one number")

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import numbers
 from ..errors import InputError
 
 Float = NDArray[np.float64]
@@ -22,7 +23,7 @@ def check_times(times: ArrayLike) -> Float:
     InputError
         If one is negative or not a number.
     """
-    t = np.asarray(times, float)
+    t = numbers("times", times)
     if not np.all(t >= 0):
         raise InputError(f"times = {times!r}: must be zero or more")
     return t
@@ -36,7 +37,7 @@ def check_sizes(sizes: ArrayLike) -> Float:
     InputError
         If one is not a whole number of at least 1.
     """
-    k = np.asarray(sizes, float)
+    k = numbers("sizes", sizes)
     if not np.all((k >= 1) & (k == np.floor(k)) & np.isfinite(k)):
         raise InputError(f"sizes = {sizes!r}: must be whole numbers of at least 1")
     return k

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import is_number
+from ..checks import is_number, numbers
 from ..errors import InputError, Interrupted, did_you_mean
 from .ctrlc import CtrlC
 from .method import Run, SpatialMethod
@@ -266,11 +266,11 @@ def _times(times: Any, method: Any, problems: list[str]) -> Float | None:
             problems.append(f"times: the method {method.name!r} takes steps; say when to observe")
         return None
     try:
-        output = np.atleast_1d(np.asarray(times, float))
-        good = output.ndim == 1 and bool((np.isfinite(output) & (output >= 0)).all())
-    except (TypeError, ValueError):
-        good = False
-    if not good:
+        output = np.atleast_1d(numbers("times", times))
+    except InputError as error:
+        problems += error.problems
+        return None
+    if not (output.ndim == 1 and (np.isfinite(output) & (output >= 0)).all()):
         problems.append(f"times = {times!r}: must be finite numbers, zero or more")
         return None
     if (np.diff(output) <= 0).any():

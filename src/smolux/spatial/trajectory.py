@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from ..checks import numbers
 from ..errors import InputError
 from ..files import replacing
 from .box import Box
@@ -89,7 +90,7 @@ def instants_of(result: xr.DataTree, times: ArrayLike | None, frames: int) -> Fl
         if not isinstance(frames, (int, np.integer)) or frames < 1:
             raise InputError(f"frames = {frames!r}: must be a whole number, one or more")
         return np.linspace(0.0, reached, frames)
-    instants = np.atleast_1d(np.asarray(times, float))
+    instants = np.atleast_1d(numbers("times", times))
     if not (instants.size and (instants >= 0).all() and (instants <= reached).all()):
         raise InputError(f"times = {times!r}: must lie between 0 and the time reached, {reached:g}")
     if (np.diff(instants) < 0).any():
