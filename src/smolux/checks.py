@@ -25,7 +25,7 @@ def is_number(value: Any) -> bool:
 
 def whole(value: Any) -> int | None:
     """Return a whole number as an int; None if it is none."""
-    if isinstance(value, (bool, np.bool_, np.timedelta64, np.datetime64, str, bytes)):
+    if isinstance(value, (bool, np.bool_, complex, np.timedelta64, np.datetime64, str, bytes)):
         return None
     if _has_unit(value):
         return None
@@ -59,7 +59,7 @@ def numbers(what: str, given: Any) -> NDArray[np.float64]:
             f"{what} = {given!r}: has a unit; give plain numbers in the unit of the rates, such as "
             f'{what}.to("s").magnitude for rates per second'
         )
-    kind = values.dtype.kind
+    kind: str = values.dtype.kind
     if kind == "O":
         kind = next((k for k in map(_kind, parts) if k != "f"), "f")
     if kind == "m":
