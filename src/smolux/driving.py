@@ -147,12 +147,15 @@ class Threads(Run):
         checkpoint_every: float,
         time_limit: float | None,
         workers: int,
+        resumed: bool = False,
     ) -> None:
         super().__init__(plan, groups, progress, workers)
         self.executor, self.checkpoint, self.every = executor, checkpoint, checkpoint_every
         self.limit = np.inf if time_limit is None else time_limit
         self.saved = self.started
         self.unsaved = ""
+        #: whether the file holds this run, be it at an earlier time
+        self.written = resumed
 
     def finish(self) -> xr.Dataset:
         """Run to the end, or raise `Interrupted` with what there is."""
@@ -164,13 +167,17 @@ class Threads(Run):
             reason = self._drive()
         except KeyboardInterrupt:
             reason = "interrupted"
+        except InputError as error:  # found late in a run: what was computed before is right
+            error.checkpoint = self._save()
+            error.dataset = self.dataset(*error.problems, self.unsaved)
+            raise
         if reason:
-            self._save()
-            where = f"; go on from {self.checkpoint}" if self.checkpoint else ""
+            written = self._save()
+            where = f"; go on from {written}" if written else ""
             raise Interrupted(
                 f"{reason}{where}{self.unsaved and '; ' + self.unsaved}",
                 self.dataset(self.unsaved),
-                self.checkpoint,
+                written,
             )
         return self.dataset(self.unsaved)
 
@@ -225,15 +232,20 @@ class Threads(Run):
         elapsed = time.perf_counter() - begun
         self.report(done, events, (events - events_before) / elapsed if elapsed > 0 else 0.0)
 
-    def _save(self) -> None:
+    def _save(self) -> Path | None:
+        """Write a checkpoint if one was asked for; return the file from which the run goes on."""
         if self.checkpoint is None:
-            return
+            return None
         try:
             checkpoints.save(self.checkpoint, self.plan, self.groups)
             self.unsaved = ""
         except (OSError, InputError) as error:  # a full disk must not cost what is computed
             self.unsaved = f"no checkpoint was written: {error}"
+        else:
+            self.written = True
         self.saved = time.perf_counter()
+        # an older one is as good, if it is of this run
+        return self.checkpoint if self.written else None
 
 
 def run_group(plan: Plan, first: int, count: int) -> Group | Divided:

@@ -17,7 +17,14 @@ class InputError(ValueError):
     Attributes
     ----------
     problems : list of str
+    dataset : xarray.Dataset or None
+        What was computed, if a run had begun; output times not reached are NaN.
+    checkpoint : pathlib.Path or None
+        The file that holds the run where it ended, if one was asked for and written.
     """
+
+    dataset: object = None
+    checkpoint: object = None
 
     def __init__(self, problems: str | Sequence[str]) -> None:
         self.problems = [problems] if isinstance(problems, str) else list(problems)
@@ -35,7 +42,7 @@ class Interrupted(KeyboardInterrupt):
     dataset : xarray.Dataset
         What was computed; output times not reached are NaN.
     checkpoint : pathlib.Path or None
-        The file from which the run goes on, bit for bit.
+        The file from which the run goes on, bit for bit; None if it could not be written.
     """
 
     def __init__(self, message: str, dataset: object = None, checkpoint: object = None) -> None:

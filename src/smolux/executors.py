@@ -5,7 +5,6 @@ The only module that knows of Dask and MPI, which are loaded when they are asked
 
 from __future__ import annotations
 
-import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
@@ -22,15 +21,11 @@ from contextlib import contextmanager
 from typing import Any
 
 from .errors import InputError, WorkerError
+from .resources import cores
 
 KINDS = ("threads", "processes", "dask", "mpi")
 #: times that tasks whose workers died are run again, none of them getting done
 RETRIES = 3
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def adapted(executor: Any) -> Any:

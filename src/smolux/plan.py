@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
@@ -26,6 +25,7 @@ from .methods.base import Method
 from .model import Model
 from .population import POPULATIONS, doubles_at
 from .processes.base import PairProcess
+from .resources import available_memory
 from .weighting import WEIGHTINGS
 from .weighting.auto import Auto as AutoWeighting
 from .weighting.base import Weighting
@@ -317,9 +317,8 @@ def check_memory(plan: Plan, done: int = 0) -> None:
     ------
     InputError
     """
-    try:
-        available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):  # not known on this system
+    available = available_memory()
+    if available is None:
         return
     grid = plan.grid
     row = 8 * (plan.sizes + len(grid.edges) + len(grid.orders) + 8)
@@ -330,7 +329,7 @@ def check_memory(plan: Plan, done: int = 0) -> None:
     if observations + stores > 0.9 * available:
         raise InputError(
             f"the run needs about {(observations + stores) / 1e9:.1f} GB ({stores / 1e9:.1f} GB of "
-            f"particles, {observations / 1e9:.1f} GB of observations) and this machine has "
-            f"{available / 1e9:.1f} GB: lower particles = {plan.particles}, "
+            f"particles, {observations / 1e9:.1f} GB of observations) and this process may use "
+            f"{available / 1e9:.1f} GB of memory: lower particles = {plan.particles}, "
             f"replicas = {plan.replicas}, sizes = {plan.sizes} or the number of times"
         )

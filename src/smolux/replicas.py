@@ -53,6 +53,8 @@ Int = NDArray[np.int64]
 
 #: seconds between returns to Python
 _SLICE = 0.1
+#: what a replica returns with that may end the run
+_ENDING = (BAD_FACTOR, BAD_RATE, TOO_LARGE)
 
 
 @dataclass
@@ -194,7 +196,8 @@ class Group:
         )
         if len(waiting):
             rates = rates_for(self.plan.model, self.plan.weighting)
-        for r in map(int, waiting):
+        # an error comes last: the others have what they asked for when the run is written
+        for r in map(int, sorted(waiting, key=lambda r: self.codes[r] in _ENDING)):
             code = self.codes[r]
             if code == BOUND:
                 self.plan.method.supply_bound(self.work, rates, self.state, r)

@@ -14,11 +14,12 @@ from . import checkpoint as checkpoints
 from .checks import is_number
 from .driving import Elsewhere, Progress, Threads
 from .errors import InputError
-from .executors import adapted, cores, workers_of
+from .executors import adapted, workers_of
 from .methods.base import Method
 from .model import Model
 from .pilot import settled
 from .plan import make_plan
+from .resources import cores
 from .subvolumes import start
 from .weighting.base import Weighting
 
@@ -125,10 +126,12 @@ def simulate(
     Raises
     ------
     InputError
-        With every mistake in the arguments, or when the kernel gives no valid rate during the run.
+        With every mistake in the arguments, or when the kernel gives no valid rate during the run:
+        then its `dataset` holds what was reached, and its `checkpoint` the file, if one was asked
+        for.
     Interrupted
         On Ctrl-C, or past the time limit; holds the dataset of what was reached, and the
-        checkpoint from which `resume` goes on, bit for bit.
+        checkpoint from which `resume` goes on, bit for bit, if one was written.
     WorkerError
         If processes of an executor die again and again.
 
@@ -204,8 +207,8 @@ def resume(
     plan, groups = checkpoints.load(file, model)
     workers = max(1, cores() // plan.subvolumes)
     return Threads(
-        plan, groups, executor, progress, file, checkpoint_every, time_limit, workers
-    ).finish()
+        plan, groups, executor, progress, file, checkpoint_every, time_limit, workers, True
+    ).finish()  # fmt: skip
 
 
 def _control_problems(

@@ -94,6 +94,44 @@ def test_an_error_of_progress_is_not_swallowed(path: Path) -> None:
         simulate(checkpoint=path, progress=fail)
 
 
+def test_a_rate_that_is_no_number_late_keeps_what_was_computed(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    serve = replicas.Group._serve
+
+    def late(group: Any) -> None:
+        serve(group)
+        if group.fraction > 0.3:
+            raise InputError("a rate is nan; it must be a finite number")
+
+    for file in (None, path):
+        with monkeypatch.context() as patch:
+            patch.setattr(replicas.Group, "_serve", late)
+            with pytest.raises(InputError, match="finite number") as caught:
+                simulate(checkpoint=file)
+        ds: Any = caught.value.dataset
+        assert caught.value.checkpoint == file
+        assert not ds.attrs["complete"]
+        assert "finite number" in ds.attrs["warnings"]
+        # the replica that fell had come past the second time, and not to the last
+        assert np.isfinite(ds["number_density"].values[:, 1]).any()
+        assert np.isnan(ds["number_density"].values[:, 3]).any()
+    runs.assert_same(simulate(), sx.resume(path))
+
+
+def test_a_checkpoint_that_was_not_written_is_not_named(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(checkpoints.np, "savez", full)
+    stop = stopped(path)
+    assert stop.checkpoint is None
+    assert "go on from" not in str(stop)
+    assert "no checkpoint was written" in str(stop)
+
+
 def test_without_a_checkpoint() -> None:
     with pytest.raises(Interrupted) as caught:
         simulate(particles=100_000, time_limit=1e-9)

@@ -10,7 +10,7 @@ from ..case.physics import model_tables
 from ..case.settings import as_table
 from ..case.write import value
 from ..errors import InputError
-from ..executors import cores
+from ..resources import cores
 from .console import amount, duration
 from .estimate import estimate, negative_rates, physics_warnings
 

@@ -14,10 +14,10 @@ import smolux
 from ..case import Case
 from ..case.settings import Run
 from ..errors import Interrupted
-from ..executors import cores
 from ..initial import Sizes
 from ..pilot import settled
 from ..plan import make_plan
+from ..resources import cores
 
 Float = NDArray[np.float64]
 

@@ -205,6 +205,10 @@ def _simulate(
             _store(stop.dataset, case, directory.results)
             share = f", {100 * progress.last.fraction:.0f} % done" if progress.last else ""
             raise Interrupted(f"{str(stop).partition(';')[0]}{share}") from None
+        except InputError as error:
+            if error.dataset is not None:  # a rate was no number, late in the run
+                _store(error.dataset, case, directory.results)
+            raise
         stopper.patient = True
     _store(ds, case, directory.results)
     # not before: whatever happens between, the run can go on from it

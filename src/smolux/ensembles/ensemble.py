@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from smolux.analysis.statistics import quantile
 from smolux.checks import whole
-from smolux.executors import cores
 from smolux.methods.base import Method
 from smolux.model import Model
 from smolux.model_dict import model_to_dict
+from smolux.resources import cores
 from smolux.results import provenance
 from smolux.weighting.base import Weighting
 

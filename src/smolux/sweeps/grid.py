@@ -19,6 +19,7 @@ from ..analysis.gathering import gather
 from ..case import Case
 from ..errors import InputError, Interrupted, SmoluxWarning
 from ..executors import adapted, completed, opened
+from ..resources import available_memory
 from .over import read_axes
 from .points import Folder, Point, Sweep, make_sweep
 
@@ -284,9 +285,8 @@ class _Running:
 
 def _check_memory(points: Sequence[Point]) -> None:
     """Refuse a sweep that cannot be gathered, before anything is computed."""
-    try:
-        available = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):  # not known on this system
+    available = available_memory()
+    if available is None:
         return
     needed = 0.0
     for point in points:
@@ -298,8 +298,8 @@ def _check_memory(points: Sequence[Point]) -> None:
     if needed > _MEMORY * available:
         raise InputError(
             f"the results of all {len(points)} points together need up to {needed / 1e9:.1f} GB, "
-            f"and this machine has {available / 1e9:.1f} GB: lower run.sizes, run.replicas or the "
-            "number of times or points"
+            f"and this process may use {available / 1e9:.1f} GB: lower run.sizes, "
+            "run.replicas or the number of times or points"
         )
 
 
