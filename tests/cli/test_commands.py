@@ -295,6 +295,16 @@ def test_demo_leaves_other_runs_alone(folder):
 # --- what goes wrong -------------------------------------------------------------------------
 
 
+def test_no_memory_is_no_bug_of_ours(folder, monkeypatch):
+    def full(*_: object) -> None:
+        raise MemoryError("Unable to allocate 7 GiB")
+
+    monkeypatch.setattr(catalogue, "overview", full)
+    result = call("kernels", code=2)
+    assert "out of memory: Unable to allocate 7 GiB" in result.stderr
+    assert "bug" not in result.stderr
+
+
 def test_our_bugs_are_exit_code_1_with_a_file_and_no_traceback(folder, monkeypatch):
     def broken(*_: object) -> None:
         raise ZeroDivisionError("surprise")

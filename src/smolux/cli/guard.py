@@ -42,6 +42,12 @@ class Commands(TyperGroup):
             # whoever read our output has gone (smolux kernels | head); stay quiet at exit too
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(0) from None
+        except MemoryError as error:
+            _say(
+                f"error: out of memory{f': {error}' if str(error) else ''}; use fewer particles, "
+                "replicas, sizes or output times, or allow this process more memory"
+            )
+            raise typer.Exit(YOURS) from None
         except OSError as error:
             if error.filename is None and error.errno is None:
                 raise _bug(ctx) from None
