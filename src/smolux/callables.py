@@ -122,7 +122,7 @@ class Function:
             return None
 
     def scalar(self, arguments: tuple[float, ...], parameters: tuple[float, ...]) -> float:
-        """Call with single numbers."""
+        """Call with single numbers; what is too large is infinite, as in compiled code."""
         return _scalar(frozen(self.function), arguments, parameters)
 
     def evaluate(self, arguments: tuple[ArrayLike, ...], parameters: tuple[float, ...]) -> Float:
@@ -183,7 +183,10 @@ def _scalar(
     function: Callable[..., Any], arguments: Iterable[float], parameters: tuple[float, ...]
 ) -> float:
     with np.errstate(all="ignore"):
-        return float(function(*(np.float64(x) for x in arguments), *parameters))
+        try:
+            return float(function(*(np.float64(x) for x in arguments), *parameters))
+        except OverflowError:
+            return np.inf
 
 
 def numbers_of(function: Callable[..., Any], most: int = 4096) -> Float:

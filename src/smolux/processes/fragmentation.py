@@ -11,12 +11,16 @@ import numpy as np
 
 from ..checks import is_number
 from ..errors import InputError
+from ..intervals import Interval
 from ..kernels import Constant, formula, from_dict, from_function
-from ..kernels.base import Kernel
+from ..kernels.base import Kernel, widen
+from ..kernels.numeric import SAFETY
 from .base import Float, LoneProcess, Varying
 
 #: entries of the law that are handled at once; sizes for which all are kept
 _BLOCK, _KEPT = 1 << 22, 1 << 12
+#: where the half of a diagonal is cut: by octaves, then in equal lengths
+_SHARES = np.concatenate(([0.0], 2.0 ** np.arange(-61.0, -3.0), np.arange(2.0, 17.0) / 16.0))
 
 
 def _split(k: int, u: float, sizes: Any, counts: Any) -> int:
@@ -104,8 +108,7 @@ class Fragmentation(Varying, LoneProcess):
 
     def ceiling(self, low: Float, high: Float) -> Float:
         """See `LoneProcess.ceiling`."""
-        one, most = np.ones(high.shape), np.maximum(high - 1.0, 1.0)
-        return 0.5 * (high - 1.0) * self.pairs.bounds(one, most, one, most)[1]
+        return 0.5 * (high - 1.0) * _along_diagonals(self.pairs, low, high)
 
     def rates(self, sizes: Float) -> Float:
         """See `LoneProcess.rates`."""
@@ -131,6 +134,49 @@ class Fragmentation(Varying, LoneProcess):
         rows = max(1, _BLOCK // m)
         blocks = [_rows(self.pairs, a, min(a + rows, m), m) @ n for a in range(0, m, rows)]
         return np.concatenate(blocks)
+
+
+def _along_diagonals(law: Kernel, low: Float, high: Float) -> Float:
+    """Bound ``F(i, k - i)`` over all i, for the sizes k in ranges.
+
+    Over all i and j below k it would be far above: F(1, 1) of small pieces, where a law falls.
+    Each diagonal is covered by narrow boxes; F is symmetric, so i goes to half of k only.
+    """
+    half = np.maximum(np.floor(0.5 * high), 1.0)
+    x, y = half * _SHARES[:-1, None], half * _SHARES[1:, None]
+    slot = np.broadcast_to(np.arange(len(high)), x.shape)
+    held = y >= 1.0
+    slot, a = slot[held], np.maximum(np.floor(x[held]), 1.0)
+    b = np.maximum(np.ceil(y[held]), a)
+    c, d = np.maximum(low[slot] - b, 1.0), np.maximum(high[slot] - a, 1.0)
+    try:
+        found = law.interval(Interval(a, b), Interval(c, d))
+    except TypeError:  # the law is known by its values only
+        return _sampled(law, low, high)
+    # a bare number if the law does not depend on the sizes
+    upper = np.broadcast_to(found.hi if isinstance(found, Interval) else float(found), a.shape)
+    bound = np.zeros(high.shape)
+    np.maximum.at(bound, slot, widen(upper, upper)[1])
+    open_ = ~np.isfinite(bound)
+    if open_.any():
+        bound[open_] = _sampled(law, low[open_], high[open_])
+    return bound
+
+
+def _sampled(law: Kernel, low: Float, high: Float) -> Float:
+    """Largest value found over the smallest and the largest size of each range, widened.
+
+    Of ranges of several sizes one of these is even and the other odd, so halves are tried.
+    """
+    largest = np.zeros(high.shape)
+    for k in (low, high):
+        i = np.ceil(np.floor(0.5 * k) * _SHARES[1:, None])
+        _, slot = np.nonzero(i >= 1.0)
+        i, slot = np.unique(np.stack([i[i >= 1.0], slot]), axis=1)
+        slot = slot.astype(int)
+        value = law(i, k[slot] - i)
+        np.maximum.at(largest, slot, np.where(np.isnan(value), 0.0, value))
+    return SAFETY * largest
 
 
 def _rows(law: Kernel, first: int, last: int, largest: int) -> Float:
