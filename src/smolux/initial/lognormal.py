@@ -57,12 +57,17 @@ class Lognormal(Initial):
 def lognormal(median: float, sigma: float, density: float = 1.0) -> Lognormal:
     """Sizes lognormally distributed, rounded to whole numbers of at least 1.
 
+    A size is a number of monomers, so a mass, not a diameter: an aerosol whose diameters have the
+    geometric standard deviation GSD has ``sigma = GSD**3`` here, and ``median`` is the cube of its
+    count median diameter over the diameter of a monomer. Rounding changes the moments where much
+    of the law lies near or below one monomer.
+
     Parameters
     ----------
     median : float
-        Median size (count median).
+        Median size (count median), in monomers.
     sigma : float
-        Geometric standard deviation, above 1.
+        Geometric standard deviation of the size, above 1.
     density : float
         Particles per unit volume.
     """
