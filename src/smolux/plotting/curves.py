@@ -42,7 +42,14 @@ class Look:
 
 
 def draw_values(
-    ax: Axes, x: Float, values: Float, look: Look, *, counts: bool = False, **options: Any
+    ax: Axes,
+    x: Float,
+    values: Float,
+    look: Look,
+    *,
+    counts: bool = False,
+    line: bool | None = None,
+    **options: Any,
 ) -> None:
     """Draw the mean of simulated replicas with 95 % intervals by Student's t.
 
@@ -57,15 +64,26 @@ def draw_values(
     look : Look
     counts : bool
         Whether the values are counts: if all replicas have the same, that is luck, not certainty.
+    line : bool, optional
+        Whether it is a line with a band instead of dots; by the number of points if left out.
     **options
         For the markers, such as ``zorder``.
     """
     count, mean, error = over_replicas(values)
     error = np.where(error == 0, np.nan, error) if counts else error
-    draw_points(ax, x, mean, quantile(count) * error, look, **options)
+    draw_points(ax, x, mean, quantile(count) * error, look, line=line, **options)
 
 
-def draw_points(ax: Axes, x: Float, mean: Float, half: Float, look: Look, **options: Any) -> None:
+def draw_points(
+    ax: Axes,
+    x: Float,
+    mean: Float,
+    half: Float,
+    look: Look,
+    *,
+    line: bool | None = None,
+    **options: Any,
+) -> None:
     """Draw points with given half widths of their bars, NaN where they are not known."""
     shown = np.isfinite(mean) & np.isfinite(x)
     if ax.get_yscale() == "log":
@@ -73,7 +91,7 @@ def draw_points(ax: Axes, x: Float, mean: Float, half: Float, look: Look, **opti
     if ax.get_xscale() == "log":
         shown &= x > 0
     x, mean, half = x[shown], mean[shown], half[shown]
-    if len(x) > _CROWDED:
+    if len(x) > _CROWDED if line is None else line:
         ax.plot(x, mean, color=look.colour, lw=0.8, **options)
         ax.fill_between(x, mean - half, mean + half, color=look.colour, alpha=0.25, lw=0)
         return
@@ -110,10 +128,12 @@ def draw(ax: Axes, ds: xr.Dataset, x: Float, values: Float, look: Look, **option
         draw_values(ax, x, values, look, **options)
 
 
-def handle(ds: xr.Dataset, label: str, look: Look | None = None) -> Artist:
-    """Legend entry of a result."""
+def handle(
+    ds: xr.Dataset, label: str, look: Look | None = None, *, line: bool | None = None
+) -> Artist:
+    """Legend entry of a result; `line` as in `draw_values`, by the number of times if left out."""
     look = look or Look(GREY, "o")
-    if is_deterministic(ds) or crowded(ds):
+    if is_deterministic(ds) or (crowded(ds) if line is None else line):
         return Line2D([], [], color=look.colour, label=label)
     fill = "none" if look.hollow or ds.sizes["replica"] == 1 else look.colour
     return Line2D([], [], color=look.colour, marker=look.marker, mfc=fill, ls="none", label=label)

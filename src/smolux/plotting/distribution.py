@@ -216,8 +216,12 @@ def size_distribution(
         if is_deterministic(ds):
             _line(ax, ds, time, look.colour)
         else:
-            draw_values(ax, table.positions(), table.density, look, counts=True, zorder=3)
-        handles.append(handle(ds, time_label(float(ds["time"].values[time])), look))
+            # dots at every time, however many classes it has
+            draw_values(
+                ax, table.positions(), table.density, look, counts=True, line=False, zorder=3
+            )
+        label = time_label(float(ds["time"].values[time]), ds["time"].attrs.get("units"))
+        handles.append(handle(ds, label, look, line=False))
     ax.set_xlim(0.8, 1.3 * largest)
     ax.set_ylim(bottom / 3, 3 * top)
     ax.set_xlabel("cluster size $k$")

@@ -78,10 +78,11 @@ def scaling(
         if is_deterministic(ds):
             draw_line(ax, x, phi[0], look.colour)
         else:
-            draw_values(ax, x, phi, look, counts=True, zorder=3)
+            draw_values(ax, x, phi, look, counts=True, line=False, zorder=3)
         mean = over_replicas(phi)[1]
         shown.append(np.stack([x, mean])[:, mean > 0])
-        handles.append(handle(ds, time_label(float(ds["time"].values[time])), look))
+        label = time_label(float(ds["time"].values[time]), ds["time"].attrs.get("units"))
+        handles.append(handle(ds, label, look, line=False))
     if reference is not None:
         x, phi = _scaled(reference, reference.sizes["time"] - 1)
         draw_line(ax, x, phi[0], "black", zorder=1)

@@ -31,6 +31,9 @@ PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#0
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 GREY = "#555555"
 
+#: how a dimensionless quantity says so
+_NO_UNIT = (None, "", "1", 1)
+
 _STYLE: dict[str, Any] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
@@ -98,14 +101,24 @@ def axes_of(ax: Axes | None, width: Width, aspect: float = 0.8) -> Axes:
     return new_figure(width, aspect if width == "single" else 0.6 * aspect).subplots()
 
 
-def time_label(time: float) -> str:
-    """Label of one output time."""
-    return f"$t = {time:.4g}$"
+def time_label(time: float, units: object = None) -> str:
+    """Label of one output time, with its unit if it has one."""
+    digits, _, power = f"{time:.4g}".partition("e")
+    if power:
+        ten = f"10^{{{int(power)}}}"
+        digits = ten if digits == "1" else rf"{digits} \times {ten}"
+    label = f"$t = {digits}$"
+    return label if units in _NO_UNIT else f"{label} {unit_text(units)}"
+
+
+def unit_text(units: object) -> str:
+    """Write a unit as it is printed: its powers raised, ``m-3`` as ``m$^{-3}$``."""
+    return re.sub(r"(?<=[A-Za-zµμ])(?:\^|\*\*)?(-?\d+)", r"$^{\1}$", str(units))
 
 
 def quantity(text: str, units: object) -> str:
     """Label an axis with a quantity and its unit; a dimensionless quantity has none."""
-    return text if units in (None, "", "1", 1) else f"{text} ({units})"
+    return text if units in _NO_UNIT else f"{text} ({unit_text(units)})"
 
 
 def prefers_log(values: np.ndarray, ratio: float = 30.0) -> bool:
