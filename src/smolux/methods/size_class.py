@@ -317,7 +317,8 @@ def _more_chunks(work: Work) -> Work:
     work.meta[:, FREE] += old
     return work._replace(
         free=free,
-        where=enlarged(work.where, 2 * work.where.shape[2]),
+        # as places beyond the end were taken, so that those drawn ahead are right or found anew
+        where=np.pad(work.where, ((0, 0), (0, 0), (0, work.where.shape[2])), mode="edge"),
         pool=enlarged(work.pool, 2 * old << chunk),
     )
 

@@ -83,8 +83,14 @@ def locate(w):
 
 @piece
 def place_in(w, g, slot):
-    """Place of a slot of any class, 0 if it is only counted; without a branch."""
-    return place_of(w, g, slot if is_list(w, g) else 0)
+    """Place of a slot of any class, 0 if it is only counted; without a branch.
+
+    Candidates are drawn for more slots than a list may hold so far; those beyond have any place.
+    """
+    bits = w.meta[CHUNK]
+    slot = slot if is_list(w, g) else 0
+    chunk = np.int64(w.where[at(g), at(min(slot >> bits, w.where.shape[1] - 1))])
+    return (chunk << bits) + (slot & ((1 << bits) - 1))
 
 
 @piece

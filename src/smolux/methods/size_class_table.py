@@ -10,8 +10,7 @@ from ..core import alias
 from ..core.compile import cold_piece, piece
 from ..core.slots import slot_top
 from ..core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
-from .size_class_lists import is_list
-from .size_class_state import AHEAD, BITS, BLOCK, CHUNK, NEXT, PAIRS, SHARE, SPAN, STALE
+from .size_class_state import AHEAD, BITS, BLOCK, NEXT, PAIRS, SHARE, SPAN, STALE
 
 #: standard deviations of what comes in for which there is room at most
 _WIDEST = 8.0
@@ -45,7 +44,6 @@ def _give_room(s, w, used):
     """
     since = float(max(s.count[SINCE], 1))
     n, table = float(s.count[PARTICLES]), 16.0 + 0.125 * used * (used + 1)
-    most = w.where.shape[1] << w.meta[CHUNK]
     events = max(min(math.sqrt(n * table), 0.25 * n, 32.0 * since + 64.0), 1.0)
     w.meta[BLOCK] = np.int64(events)
     w.meta[SPAN] = w.meta[SPAN] // 2 + np.int64(since)
@@ -60,8 +58,6 @@ def _give_room(s, w, used):
         spread = min(math.sqrt(2.0 * math.log(worth)), _WIDEST) if worth > 1.0 else 0.0
         slack = events * gain + spread * math.sqrt(events * come)
         w.room[g] = w.number[g] + np.int64(slack + 0.5)
-        if is_list(w, g):
-            w.room[g] = min(w.room[g], most)
         w.before[g] = w.number[g]
         w.flow[g] //= 2
 
