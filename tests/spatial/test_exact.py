@@ -76,3 +76,32 @@ def test_stopping_and_going_on_changes_nothing():
     while parts.advance(np.inf, 1, 1) is None:
         pass
     assert_same(parts.trace(), whole)
+
+
+def far_pair(dimension: int, miss: float, angle: float) -> sp.System:
+    """Two discs of radius 1 that fly towards each other across a box of side 1e9.
+
+    Their centres pass at `2 + miss`.
+    """
+    ahead, aside = np.zeros(dimension), np.zeros(dimension)
+    ahead[:2] = np.cos(angle), np.sin(angle)
+    aside[:2] = -np.sin(angle), np.cos(angle)
+    if dimension == 3:  # both out of the plane
+        ahead[1:] = ahead[1] * 0.6, ahead[1] * 0.8
+        aside[1:] = aside[1] * 0.6, aside[1] * 0.8
+    way = 4e8 * ahead + (2 + miss) / 2 * aside
+    return sp.System(5e8 + np.array([-way, way]), np.array([ahead, -ahead]), radius=1.0, box=1e9)
+
+
+@pytest.mark.parametrize(
+    ("dimension", "method"),
+    [(2, "windowed"), (2, "cells"), (2, "all-pairs"), (3, "windowed"), (3, "cells")],
+)
+def test_a_miss_from_afar_is_a_miss(dimension, method):
+    for angle in (0.0, 0.3, 1.1, 2.5):
+        assert len(merges(run(far_pair(dimension, 1.0, angle), method, until=4.1e8))) == 0
+        trace = run(far_pair(dimension, -1.0, angle), method, until=4.1e8)
+        np.testing.assert_array_equal(merges(trace), [[0, 1]])
+        # centres at 1 aside touch at sqrt(3) ahead; positions are known to 1e-7
+        time = trace.log.time[trace.log.merges]
+        np.testing.assert_allclose(time, 4e8 - np.sqrt(3) / 2, rtol=0, atol=1e-6)

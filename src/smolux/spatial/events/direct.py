@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.compile import entry, piece
-from .geometry import FILLED, contact_time, shift, wall_time
+from .geometry import FILLED, contact_time, crossed, shift, wall_time
 from .grid import insert, neighbour
 
 # Entries of Discs.clock.
@@ -61,7 +61,9 @@ class Discs(NamedTuple):
 @piece
 def pair_time(discs, i, j, d):
     """Time to the contact of two discs, from the nearest image."""
-    a, b, c = 0.0, 0.0, -((discs.radius[i] + discs.radius[j]) ** 2)
+    s = discs.radius[i] + discs.radius[j]
+    a, b, c, cross = 0.0, 0.0, -s * s, 0.0
+    x1, w1, x2, w2 = 0.0, 0.0, 0.0, 0.0  # components before
     for k in range(d):
         dx = discs.x[j, k] - discs.x[i, k]
         dx += shift(dx, discs.period[k])
@@ -69,7 +71,9 @@ def pair_time(discs, i, j, d):
         a += w * w
         b += dx * w
         c += dx * dx
-    return contact_time(a, b, c)
+        cross += crossed(dx, w, x1, w1, x2, w2)
+        x1, w1, x2, w2 = dx, w, x1, w1
+    return contact_time(a, b, c, s, cross)
 
 
 @piece

@@ -23,18 +23,26 @@ def smaller(a, b):
 
 
 @piece
-def contact_time(a, b, c):
+def crossed(x, w, x1, w1, x2, w2):
+    """Return what components k of d and w add to ``|d x w|^2``; the others are those before k."""
+    one, two = x * w1 - x1 * w, x * w2 - x2 * w
+    return one * one + two * two
+
+
+@piece
+def contact_time(a, b, c, s, cross):
     """Time to the contact of two discs; infinite if they miss each other.
 
     With the separation d, the relative velocity w and the sum of radii s: ``a = |w|^2``,
-    ``b = d.w``, ``c = |d|^2 - s^2``. The root of ``a t^2 + 2 b t + c`` is taken in the form
-    without cancellation. Discs that touch and approach meet now; those that part never do.
+    ``b = d.w``, ``c = |d|^2 - s^2``, ``cross = |d x w|^2``. The root of ``a t^2 + 2 b t + c`` is
+    taken in the form without cancellation, and so is ``b^2 - a c``, which from afar would lose the
+    radii. Discs that touch and approach meet now; those that part never do.
     """
     if b >= 0.0:
         return math.inf
     if c <= 0.0:
         return 0.0
-    square = b * b - a * c
+    square = a * s * s - cross
     return c / (math.sqrt(square) - b) if square >= 0.0 else math.inf
 
 

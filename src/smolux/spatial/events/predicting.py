@@ -31,7 +31,7 @@ from .flight import (
     VERSION,
     WAY,
 )
-from .geometry import contact_time, shift, smaller, wall_time
+from .geometry import contact_time, crossed, shift, smaller, wall_time
 from .heap import push
 from .pairs import drop
 
@@ -66,7 +66,8 @@ def bind(d):
         spread = f.count[SPREAD]
         s = radius[i * spread] + radius[j * spread]
         dm, dn = t - body[m, since], t - body[n, since]
-        a, b, c = 0.0, 0.0, -s * s
+        a, b, c, cross = 0.0, 0.0, -s * s, 0.0
+        x1, w1, x2, w2 = 0.0, 0.0, 0.0, 0.0  # components before
         for k in range(d):
             vm, vn = body[m, d + k], body[n, d + k]
             x = rel[j, k] + place[h, k] + body[n, k] + vn * dn
@@ -76,9 +77,11 @@ def bind(d):
             a += w * w
             b += x * w
             c += x * x
+            cross += crossed(x, w, x1, w1, x2, w2)
+            x1, w1, x2, w2 = x, w, x1, w1
         f.count[PREDICTED] += 1
         half_edge[2 * p, VERSION] += 1
-        touch = t + contact_time(a, b, c)
+        touch = t + contact_time(a, b, c, s, cross)
         if touch <= smaller(body[m, horizon], body[n, horizon]):
             push(f, touch, p, half_edge[2 * p, VERSION])
 

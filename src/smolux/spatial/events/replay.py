@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.compile import entry, piece
-from .geometry import shift
+from .geometry import crossed, shift
 
 
 class Forest(NamedTuple):
@@ -67,12 +67,14 @@ def describe(forest, merges, m, x, radius, period, ends, gap, a, b, work):
     """Write down what a merge is, before it happens; the two discs touch at `ends`."""
     i, j = ends
     mu = forest.mass[a] * forest.mass[b] / (forest.mass[a] + forest.mass[b])
-    square, along, distance = 0.0, 0.0, 0.0
+    square, distance, cross = 0.0, 0.0, 0.0
+    x1, w1, x2, w2 = 0.0, 0.0, 0.0, 0.0  # components before
     for k in range(x.shape[1]):
         w = forest.velocity[b, k] - forest.velocity[a, k]
         square += w * w
-        along += w * gap[k]
         distance += gap[k] * gap[k]
+        cross += crossed(gap[k], w, x1, w1, x2, w2)
+        x1, w1, x2, w2 = gap[k], w, x1, w1
     distance = math.sqrt(distance)
     share = radius[i] / (radius[i] + radius[j])
     for k in range(x.shape[1]):
@@ -83,7 +85,7 @@ def describe(forest, merges, m, x, radius, period, ends, gap, a, b, work):
     merges.sizes[m, 0], merges.sizes[m, 1] = forest.size[a], forest.size[b]
     merges.masses[m, 0], merges.masses[m, 1] = forest.mass[a], forest.mass[b]
     merges.speed[m] = math.sqrt(square)
-    merges.impact[m] = math.sqrt(max(distance**2 - along**2 / square, 0.0)) if square > 0 else 0.0
+    merges.impact[m] = math.sqrt(cross / square) if square > 0 else 0.0
     merges.loss[m] = 0.5 * mu * square
     merges.gap[m] = distance - radius[i] - radius[j]
 
