@@ -334,10 +334,35 @@ def windows_for(
     return Windows(np.array(edges), array, total, *_beside(processes, weighting or Number()))
 
 
-def inflow(processes: Sequence[Process], weighting: Weighting) -> float:
-    """Return the simulated particles that come in for a unit of volume and time, at the start."""
-    tables = [(p.table, p.factor(0.0)) for p in processes if isinstance(p, Source)]
-    return float(sum(f * rates @ weighting.weights(sizes) for (sizes, rates), f in tables))
+#: times at which the inflow is looked at for its mean
+_INFLOW_SAMPLES = 4096
+
+
+def inflow(processes: Sequence[Process], weighting: Weighting, end: float) -> float:
+    """Return the simulated particles that come in for a unit of volume and time.
+
+    The mean from time zero to `end`: a source may be silent at the start.
+
+    Raises
+    ------
+    InputError
+        If nothing is seen to come in until then.
+    """
+    # spread by the golden ratio: in step with no period
+    times = end * np.modf(np.arange(1, _INFLOW_SAMPLES + 1) * 0.6180339887498949)[0]
+    total = 0.0
+    for source in (p for p in processes if isinstance(p, Source)):
+        sizes, rates = source.table
+        factor = source.factor
+        mean = factor.constant if factor.constant is not None else float(np.mean(factor(times)))
+        total += float(mean * rates @ weighting.weights(sizes))
+    if not 0.0 < total < np.inf:
+        raise InputError(
+            f"source: the mean inflow from t = 0 to the last output time, {end:g}, is {total:g}, "
+            "and a run that begins empty takes its volume from it; it must be finite and above "
+            "zero: correct varying, or run to a later time"
+        )
+    return total
 
 
 def _beside(processes: Sequence[Process], weighting: Weighting) -> tuple[Any, ...]:

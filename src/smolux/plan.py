@@ -82,7 +82,12 @@ class Plan:
         if self.start.total > 0.0:
             return self.particles / self.start.total
         # so many particles come in per unit of time
-        return self.particles / inflow(self.model.processes, self.weighting)
+        return self.particles / inflow(self.model.processes, self.weighting, self.times[-1])
+
+    @property
+    def doubles_at(self) -> int:
+        """How few particles double the volume, 0 for never: as what begins empty."""
+        return doubles_at(self.population, self.particles) if self.start.total > 0.0 else 0
 
     @property
     def mass(self) -> int:
@@ -240,7 +245,7 @@ def _circumstances(plan: Plan) -> Circumstances:
         means,
         plan.times[-1],
         plan.groups(_WORKERS)[0][1],
-        doubles_at(plan.population, plan.particles) > 0,
+        plan.doubles_at > 0,
     )
 
 

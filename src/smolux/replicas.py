@@ -47,7 +47,6 @@ from .errors import InputError
 from .initial import Sizes
 from .model import Model
 from .plan import Plan
-from .population import doubles_at
 
 Int = NDArray[np.int64]
 
@@ -101,8 +100,7 @@ class Group:
     ) -> Group:
         """Start with these particles; see `start`."""
         count, processes = len(state.rng), plan.model.processes
-        if plan.start.total > 0.0:  # what begins empty is not doubled
-            state.count[:, DOUBLE_AT] = doubles_at(plan.population, plan.particles)
+        state.count[:, DOUBLE_AT] = plan.doubles_at
         state.count[:, PAUSE] = plan.distribution
         return cls(
             plan,

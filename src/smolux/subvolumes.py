@@ -46,7 +46,6 @@ from .core.state import (
 )
 from .methods.base import merged
 from .plan import LEAST, Plan
-from .population import doubles_at
 from .processes.base import PairProcess
 from .replicas import Group, empty_state, initial_populations
 
@@ -178,7 +177,7 @@ class Divided:
         """Double the volume as often as the policy says; return how often each particle comes."""
         clock, count = self.state.clock[0], self.state.count[0]
         copies = 1
-        while 0 < count[PARTICLES] <= doubles_at(self.plan.population, self.plan.particles):
+        while 0 < count[PARTICLES] <= self.plan.doubles_at:
             copies *= 2
             count[PARTICLES] *= 2
             count[DOUBLINGS] += 1

@@ -17,6 +17,7 @@ from ..errors import Interrupted
 from ..initial import Sizes
 from ..pilot import settled
 from ..plan import make_plan
+from ..processes import Source
 from ..resources import cores
 
 Float = NDArray[np.float64]
@@ -70,14 +71,14 @@ class Pilot:
 
     def fewest(self, run: Run) -> float:
         """Particles of one replica of the case where they are fewest, were the volume fixed."""
+        if self.number_density[0] == 0.0:  # it begins empty, and that is no loss
+            return float("inf")
         return float(np.min(self.number_density) / self.number_density[0]) * run.particles
 
     def growth(self, run: Run) -> float:
         """Most particles of one replica over those at its start."""
-        ratio = self.number_density / self.number_density[0]
-        if run.population == "doubling":
-            ratio = ratio * self.volume / self.volume[0]
-        return float(max(1.0, np.max(ratio)))
+        volume = self.volume if run.population == "doubling" else self.volume[0]
+        return float(max(1.0, np.max(self.number_density * volume) / self.particles))
 
 
 @dataclass(frozen=True)
@@ -205,8 +206,11 @@ def _bytes(case: Case, run: Run, small: Pilot) -> tuple[float, float]:
 
 
 def mean_size(case: Case) -> float:
-    """Mean size at the start, from a sample."""
+    """Mean size at the start, from a sample; of what comes in, if it begins empty."""
     sizes, counts = case.model.initial.sample(10_000, 0.5)
+    if not counts.sum():
+        tables = [p.table for p in case.model.processes if isinstance(p, Source)]
+        sizes, counts = (np.concatenate(parts) for parts in zip(*tables, strict=True))
     return float(np.average(sizes, weights=counts))
 
 

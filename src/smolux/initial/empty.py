@@ -52,6 +52,6 @@ def empty() -> Empty:
     """No particles at the start: for systems with a source.
 
     The volume of a simulation is then chosen so that the sources bring in as many `particles` in a
-    unit of time, at their rates at time zero; it is never doubled.
+    unit of time, at their mean rates up to the last output time; it is never doubled.
     """
     return Empty()
