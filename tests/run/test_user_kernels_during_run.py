@@ -26,13 +26,13 @@ every_method = pytest.mark.parametrize(
 )
 #: few buckets: a table for the many that are usual would be a million calls from Python
 SETTINGS = {"inverse": sx.methods.Inverse(buckets=64)}
-#: a size that no sample of the checks at the start holds
-ODD = 21.0
+#: the square of 21, a size that no sample holds: it is not among the numbers that `odd` reads
+SQUARE = 441.0
 
 
-def odd(i: float, j: float, at: float = ODD, value: float = 1.0) -> float:
+def odd(i: float, j: float, square: float = SQUARE, value: float = 1.0) -> float:
     """Constant, but for pairs with one size; `value` above 8 stands for what is no number."""
-    if i == at or j == at:
+    if i * i == square or j * j == square:
         if value == 9.0:
             return math.nan
         if value == 10.0:
@@ -42,7 +42,8 @@ def odd(i: float, j: float, at: float = ODD, value: float = 1.0) -> float:
 
 
 def spike(t: float, low: float = 0.0, high: float = 0.0) -> float:
-    if abs(t - 0.32706) < 5e-5:  # narrower than the distance of the samples
+    # at t = 0.32706, which it does not name, and narrower than the distance of the samples
+    if abs(t * t - 0.1069682) < 3.3e-5:
         return high
     return low
 
