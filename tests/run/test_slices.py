@@ -60,8 +60,10 @@ def assert_same(one: Group, other: Group, a: Any, b: Any) -> None:
         np.testing.assert_array_equal(*values, err_msg=name)
 
 
-@pytest.mark.parametrize("population", ["doubling", "fixed-volume"])
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("population", ["doubling", pytest.param("fixed-volume", marks=slow)])
+@pytest.mark.parametrize(
+    "case", [pytest.param(c, marks=() if c.startswith("open") else slow) for c in CASES]
+)
 @pytest.mark.parametrize("method", METHODS)
 def test_slices_of_any_length(method: str, case: str, population: str) -> None:
     whole = finished(started(case, method, population, 0, 3), 1 << 40)
