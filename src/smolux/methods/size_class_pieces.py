@@ -126,9 +126,8 @@ def _make_find(rate: Any) -> Any:
                 return math.nan, one, two, i, j, trials, c0, c1, c2, c3
             if taken == 1:
                 return waited * held[0], one, two, i, j, trials, c0, c1, c2, c3
-        w.meta[STALE] = (
-            1  # candidates are for places that are empty by now, if nearly all are in vain
-        )
+        # if nearly all are in vain, candidates are for places that are empty by now
+        w.meta[STALE] = 1
         return waited * held[0], -1, -1, 0, 0, trials, c0, c1, c2, c3
 
     return find
