@@ -60,9 +60,15 @@ def assert_same(one: Group, other: Group, a: Any, b: Any) -> None:
         np.testing.assert_array_equal(*values, err_msg=name)
 
 
-@pytest.mark.parametrize("population", ["doubling", pytest.param("fixed-volume", marks=slow)])
 @pytest.mark.parametrize(
-    "case", [pytest.param(c, marks=() if c.startswith("open") else slow) for c in CASES]
+    ("case", "population"),
+    [
+        ("open", "doubling"),
+        ("open, fewer at the start", "doubling"),
+        pytest.param("open", "fixed-volume", marks=slow),
+        pytest.param("pairs", "doubling", marks=slow),
+        pytest.param("single", "fixed-volume", marks=slow),
+    ],
 )
 @pytest.mark.parametrize("method", METHODS)
 def test_slices_of_any_length(method: str, case: str, population: str) -> None:
