@@ -116,7 +116,7 @@ class _Digest:
         if _holds(value):
             for name in names:
                 # each function may take something else from the same module
-                if name in vars(value) and (id(value), name) not in self._taken:
+                if _has(value, name) and (id(value), name) not in self._taken:
                     self._taken.add((id(value), name))
                     self._kept.append(value)
                     self._text(f"attribute {name}")
@@ -131,6 +131,13 @@ def _holds(value: Any) -> bool:
         *INSTALLED,
         "builtins",
     }
+
+
+def _has(value: Any, name: str) -> bool:
+    """Whether a value has an attribute; that of a class may be inherited, of a module made."""
+    if isinstance(value, (types.ModuleType, type)):
+        return hasattr(value, name)
+    return name in vars(value)
 
 
 def names_in(code: types.CodeType) -> list[str]:
