@@ -14,11 +14,12 @@ from .content import digest, frozen, is_frozen
 from .core import beside, rng
 from .core.burst import make_burst
 from .core.compile import piece, user_piece, why_not
-from .core.lone import CEILING_BITS, Lone, bind_outcomes, bind_rates, make_lone
+from .core.lone import Lone, bind_outcomes, bind_rates, make_ledger, make_lone
 from .core.loop import make_fire, make_loop, make_next_event
 from .core.record import tally_one
 from .core.slots import slot_edges
-from .core.state import LIMIT, Parameters, Windows
+from .core.splits import fill, new_splits, slots_beside
+from .core.state import LIMIT, LONE_BITS, Parameters, Windows
 from .core.weights import (
     make_outcome,
     make_rate,
@@ -210,14 +211,15 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
         return make_loop(pieces, make_next_event(pieces.draw, burst), fire)
     about = [Lone(p.law, type(p).outcome, p.least, p.splits, p.opens) for p in lone]
     shape = len(pairs), len(lone), len(sources)
-    rate = bind_rates(about)
-    draw_lone = make_lone(pieces.lone, rate, shape[0], shape[1])
-    choose = beside.make_choice(rate, _factors(_rates(lone)), _factors(_rates(sources)), *shape)
+    rates = bind_rates(about)
+    ledger = make_ledger(rates, lambda tally: method.bind(simulated, tally).visit, shape[1])
+    draw_lone = make_lone(pieces.pick, rates, shape[0], shape[1])
+    choose = beside.make_choice(_factors(_rates(lone)), _factors(_rates(sources)), *shape)
     fire = beside.make_fire(
         pieces, outcome, factor, bind_outcomes(about), choose, make_stands(weight),
-        make_replacement(weight), shape[0], shape[1],
+        make_replacement(weight), ledger, rates.known, shape[0], shape[1],
     )  # fmt: skip
-    next_event = beside.make_next_event(pieces.draw, draw_lone, pieces.seize, *shape)
+    next_event = beside.make_next_event(pieces.draw, ledger.ready, draw_lone, pieces.seize, *shape)
     return make_loop(pieces, next_event, fire)
 
 
@@ -277,16 +279,26 @@ def rates_for(model: Model, weighting: Weighting) -> Rates:
 
 
 def factor_parameters(processes: Sequence[Process]) -> Parameters:
-    """Return the parameters of the processes, as the loop takes them."""
+    """Return the parameters of the processes, as the loop takes them, with tables to be filled."""
     pairs = [p for p in processes if isinstance(p, PairProcess)]
     lone = [p for p in processes if isinstance(p, LoneProcess)]
     return Parameters(
         tuple(p.factor.parameters for p in pairs or [Aggregation()]),
         tuple(p.parameters for p in pairs or [Aggregation()]),
-        tuple(p.parameters for p in lone),
+        tuple((p.parameters, new_splits()) if p.splits else (p.parameters,) for p in lone),
         tuple(p.factor.parameters for p in lone),
         tuple(p.factor.parameters for p in processes if isinstance(p, Source)),
     )
+
+
+def bound_splits(processes: Sequence[Process], parameters: Parameters, size: int) -> None:
+    """Bound the splits of the octave of a size, for which the loop returned `SPLITS`."""
+    slots, edges = slots_beside(size), slot_edges(LONE_BITS).astype(float)
+    low, high = edges[slots], edges[1:][slots] - 1.0
+    lone = [p for p in processes if isinstance(p, LoneProcess)]
+    for process, own in zip(lone, parameters.lone, strict=True):
+        if process.splits:
+            fill(own[1], slots, *process.split_bounds(low, high))
 
 
 def _edges(end: float) -> list[float]:
@@ -366,13 +378,7 @@ def inflow(processes: Sequence[Process], weighting: Weighting, end: float) -> fl
 
 
 def _beside(processes: Sequence[Process], weighting: Weighting) -> tuple[Any, ...]:
-    """Tables of single particles and of sources, see `smolux.core.state.Windows`."""
-    edges = slot_edges(CEILING_BITS).astype(float)
-    low, high = edges[1:-1], edges[2:] - 1.0
-    lone = [p for p in processes if isinstance(p, LoneProcess)]
-    ceiling = np.zeros((len(lone), len(edges) - 1))
-    for k, process in enumerate(lone):
-        ceiling[k, 1:] = np.maximum.accumulate(process.ceiling(low, high))
+    """Tables of sources, and what is cut off, see `smolux.core.state.Windows`."""
     tables = [p.table for p in processes if isinstance(p, Source)]
     most = max((len(sizes) for sizes, _ in tables), default=0)
     size, share = np.ones((len(tables), most), np.int64), np.ones((len(tables), most))
@@ -384,7 +390,7 @@ def _beside(processes: Sequence[Process], weighting: Weighting) -> tuple[Any, ..
         share[k, : len(sizes)] = np.cumsum(simulated) / inflow[k]
         share[k, len(sizes) - 1 :] = 1.0
     cut = [(p.above or LIMIT, k) for k, p in enumerate(processes) if isinstance(p, Removal)]
-    return ceiling, inflow, size, share, np.array(min(cut, default=(LIMIT, 0)), np.int64)
+    return inflow, size, share, np.array(min(cut, default=(LIMIT, 0)), np.int64)
 
 
 def _check_factors(

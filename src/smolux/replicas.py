@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .assembly import factor_parameters, loop_for, rates_for, uncompilable, windows_for
+from .assembly import (
+    bound_splits,
+    factor_parameters,
+    loop_for,
+    rates_for,
+    uncompilable,
+    windows_for,
+)
 from .core.compile import CompileError
 from .core.rng import streams
 from .core.state import (
@@ -19,6 +26,7 @@ from .core.state import (
     BOUND,
     BUDGET,
     CLOCKS,
+    CULPRIT,
     DONE,
     DOUBLE_AT,
     EVENTS,
@@ -29,14 +37,17 @@ from .core.state import (
     PAUSED,
     PENDING,
     PROCESS,
+    SPLITS,
     TIME,
     TOO_LARGE,
     TRIALS,
     VALUE,
     VOLUME,
+    WANTED,
     WINDOW,
     WORST_I,
     WORST_J,
+    Parameters,
     State,
     Tally,
     Windows,
@@ -47,6 +58,7 @@ from .errors import InputError
 from .initial import Sizes
 from .model import Model
 from .plan import Plan
+from .processes.base import LoneProcess
 
 Int = NDArray[np.int64]
 
@@ -72,6 +84,8 @@ class Group:
     compile_seconds: float = 0.0
     #: what `loop_for` returns for the plan, once it is known: what tells loops apart takes time
     loop: Any = None
+    #: parameters of the processes, with tables that fill up as sizes occur
+    parameters: Parameters | None = None
     #: candidates and events of a slice
     budget: int = 10_000
 
@@ -96,9 +110,16 @@ class Group:
 
     @classmethod
     def of(
-        cls, plan: Plan, first: int, state: State, work: Any, windows: Windows, loop: Any = None
+        cls,
+        plan: Plan,
+        first: int,
+        state: State,
+        work: Any,
+        windows: Windows,
+        loop: Any = None,
+        parameters: Parameters | None = None,
     ) -> Group:
-        """Start with these particles; see `start`."""
+        """Start with these particles; see `start`. The `parameters` are those of a group before."""
         count, processes = len(state.rng), plan.model.processes
         state.count[:, DOUBLE_AT] = plan.doubles_at
         state.count[:, PAUSE] = plan.distribution
@@ -112,6 +133,7 @@ class Group:
             windows,
             distribution=[[] for _ in range(count if plan.distribution else 0)],
             loop=loop,
+            parameters=parameters,
         )
 
     @property
@@ -145,6 +167,7 @@ class Group:
     def _call(self, codes: Int, budget: int) -> None:
         plan = self.plan
         self.loop = self.loop or loop_for(plan.model, plan.method, plan.weighting)
+        self.parameters = self.parameters or factor_parameters(plan.model.processes)
         self.loop(
             self.state,
             self.work,
@@ -152,7 +175,7 @@ class Group:
             self.windows,
             plan.grid,
             (*plan.model.kernel.parameters, *plan.weighting.parameters),
-            factor_parameters(plan.model.processes),
+            self.parameters,
             codes,
             budget,
         )
@@ -199,6 +222,10 @@ class Group:
             code = self.codes[r]
             if code == BOUND:
                 self.plan.method.supply_bound(self.work, rates, self.state, r)
+            elif code == SPLITS:
+                assert self.parameters is not None
+                wanted = int(self.state.count[r, WANTED])
+                bound_splits(self.plan.model.processes, self.parameters, wanted)
             elif code == PAUSED:
                 self.distribution[r].append(self.plan.method.population(self.work, self.state, r))
             elif code == BAD_FACTOR:
@@ -233,7 +260,8 @@ class Group:
 def empty_state(plan: Plan, rng: Any) -> State:
     """Return the state at the start but for the particles, for as many replicas as streams."""
     processes = plan.model.processes
-    state = new_state(rng, len(processes), max(p.entries for p in processes))
+    lone = sum(isinstance(p, LoneProcess) for p in processes)
+    state = new_state(rng, len(processes), max(p.entries for p in processes), lone)
     state.clock[:, VOLUME] = plan.volume
     state.clock[:, EXTINCT] = np.nan
     return state
@@ -251,8 +279,15 @@ def initial_populations(plan: Plan, replicas: Sequence[int]) -> list[tuple[Int, 
 
 def _bad_rate(model: Model, state: State, r: int) -> str:
     i, j = int(state.count[r, WORST_I]), int(state.count[r, WORST_J])
+    culprit = int(state.count[r, CULPRIT])
+    if culprit == 0:
+        whose, where = f"the kernel {model.kernel.label}", f"sizes {i} and {j}"
+    else:
+        process = [p for p in model.processes if isinstance(p, LoneProcess)][culprit - 1]
+        whose = f"the rate of {process.name}"
+        where = f"fragments {i} and {j}" if j else f"size {i}"
     return (
-        f"the kernel {model.kernel.label} gave {state.clock[r, VALUE]:.6g} for the sizes "
-        f"{i} and {j}, met at t = {state.clock[r, TIME]:.6g}; a rate must be a finite number, "
-        "zero or more: correct the function for these sizes"
+        f"{whose} gave {state.clock[r, VALUE]:.6g} for the {where}, met at "
+        f"t = {state.clock[r, TIME]:.6g}; a rate must be a finite number, zero or more: correct "
+        "the function there"
     )

@@ -148,7 +148,7 @@ class Divided:
         method, rates = plan.method, rates_for(plan.model, plan.weighting)
         learnt = [method.learnt(part.work, part.state) for part in self.parts]
         window = int(np.searchsorted(self.windows.edges, start, side="right")) - 1
-        loop = self.parts[0].loop
+        loop, parameters = self.parts[0].loop, [part.parameters for part in self.parts]
 
         def split(k: int) -> list[Any]:
             part, words = self.parts[k], stream(plan.entropy, self.first, _MIXING, self.stretch, k)
@@ -163,7 +163,8 @@ class Divided:
             state.clock[0, RAISED:] = clock[RAISED:]
             state.count[0, WINDOW] = window
             method.use(work, state, learnt)
-            return Group.of(plan, self.first, state, work, self.windows, loop)
+            known = parameters[k] if k < len(parameters) else None
+            return Group.of(plan, self.first, state, work, self.windows, loop, known)
 
         piles = list(pool.map(split, range(len(self.parts))))
         self.parts.clear()  # room for what follows
@@ -214,6 +215,7 @@ class Divided:
             # that and what follows: by how much bounds were raised
             np.maximum(clock[RAISED:], part.state.clock[0, RAISED:], out=clock[RAISED:])
             self.state.events[0] += part.state.events[0]
+            self.state.attempts[0] += part.state.attempts[0]
             clock[[MASS_IN, MASS_OUT]] += part.state.clock[0, [MASS_IN, MASS_OUT]]
             self.seconds += part.seconds
         clock[EXCESS] = clock[CLOCKS:].sum()

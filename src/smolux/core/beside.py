@@ -23,7 +23,6 @@ from .loop import make_choose_process, schedule, thinned
 from .state import (
     BAD_FACTOR,
     BAD_RATE,
-    CHANCE,
     CLOCKS,
     DRAW,
     EVENTS,
@@ -33,6 +32,8 @@ from .state import (
     LARGEST,
     LIMIT,
     LONE,
+    LONE_PART,
+    LONE_PROCESS,
     LONE_SIZE,
     MASS_IN,
     MASS_OUT,
@@ -40,17 +41,24 @@ from .state import (
     PHASE,
     PROCESS,
     SINCE,
+    SPLITS,
     TIME,
     TOO_LARGE,
     VOLUME,
+    WANTED,
     WINDOW,
 )
 
 PAIR, ALONE, SOURCE = 0, 1, 2
 
 
-def make_next_event(draw: Any, lone: Any, seize: Any, pairs: int, lones: int, sources: int) -> Any:
-    """Bind the drawing of the next event, of whatever kind; see `smolux.core.loop`."""
+def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lones: int,
+                    sources: int) -> Any:  # fmt: skip
+    """Bind the drawing of the next event, of whatever kind; see `smolux.core.loop`.
+
+    `ready` and `lone` are those of `smolux.core.lone`, and not called if nothing happens to single
+    particles.
+    """
 
     @cold_piece
     def source_rate(s, windows):
@@ -66,6 +74,10 @@ def make_next_event(draw: Any, lone: Any, seize: Any, pairs: int, lones: int, so
         window = s.count[WINDOW]
         s.count[KIND] = PAIR
         s.count[FIRST] = -1
+        if lones > 0:
+            reason = ready(s, w, p, q.lone)
+            if reason != 0:
+                return reason
         wait = math.inf
         if pairs > 0:
             total = windows.total[window]
@@ -76,7 +88,7 @@ def make_next_event(draw: Any, lone: Any, seize: Any, pairs: int, lones: int, so
             if math.isnan(wait):
                 return BAD_RATE
         if lones > 0:
-            alone = lone(s, w, windows, q)
+            alone = lone(s, w, windows, q.lone)
             if math.isnan(alone):
                 return BAD_RATE
             if alone < wait:
@@ -96,8 +108,7 @@ def make_next_event(draw: Any, lone: Any, seize: Any, pairs: int, lones: int, so
     return next_event
 
 
-def make_choice(rate: Any, lone_factor: Any, source_factor: Any, pairs: int, lones: int,
-                sources: int) -> Any:  # fmt: skip
+def make_choice(lone_factor: Any, source_factor: Any, pairs: int, lones: int, sources: int) -> Any:
     """Bind the choice of the process of an event that is no encounter, or none (-1)."""
 
     @cold_piece
@@ -108,22 +119,11 @@ def make_choice(rate: Any, lone_factor: Any, source_factor: Any, pairs: int, lon
 
     @cold_piece
     def choose_alone(s, windows, q):
-        total, size, u = 0.0, s.count[LONE_SIZE], s.clock[CHANCE]
-        for r in range(lones):
-            k = pairs + r
-            bound = windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
-            total += bound * rate(r, size, u, q.lone)
-        x = rng.uniform(s.rng) * total
-        r, value, bound = 0, 0.0, 0.0
-        for m in range(lones):
-            k = pairs + m
-            r, bound = m, windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
-            value = rate(m, size, u, q.lone)
-            if x < bound * value or m == lones - 1:
-                break
-            x -= bound * value
-        share = x / value if value > 0.0 else bound
-        return kept(s, windows, pairs + r, lone_factor(r, s.clock[PENDING], q.lone_factors), share)
+        r = s.count[LONE_PROCESS]
+        k = pairs + r
+        bound = windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
+        value = lone_factor(r, s.clock[PENDING], q.lone_factors)
+        return kept(s, windows, k, value, rng.uniform(s.rng) * bound)
 
     @cold_piece
     def choose_source(s, windows, q):
@@ -140,6 +140,7 @@ def make_choice(rate: Any, lone_factor: Any, source_factor: Any, pairs: int, lon
                 break
             x -= bound * windows.inflow[m]
         share = x / windows.inflow[r]
+        s.attempts[first + r] += 1
         value = source_factor(r, s.clock[PENDING], q.source_factors)
         return kept(s, windows, first + r, value, share)
 
@@ -160,16 +161,21 @@ def make_fire(
     choose: Any,
     stands: Any,
     rounded: Any,
+    ledger: Any,
+    known: Any,
     pairs: int,
     lones: int,
 ) -> Any:
     """Bind what happens when the pending event comes; see `smolux.core.loop.make_fire`.
 
     `stands` is ``stands(size, p)``, how many particles a simulated one stands for; `rounded` rounds
-    what appears, ``rounded(s, entries, size, p)``, when a particle of one size is replaced.
+    what appears, ``rounded(s, entries, size, p)``, when a particle of one size is replaced. The
+    `ledger` and `known` are those of `smolux.core.lone`, and not called if nothing happens to
+    single particles.
     """
     choose_pair = make_choose_process(pairs)
     pair, update = pieces.pair, pieces.update
+    enter, leave = ledger.enter, ledger.leave
 
     @cold_piece
     def pick(s, windows, r):
@@ -203,12 +209,72 @@ def make_fire(
             return entries, gone, 0.0, 0.0
         if s.count[KIND] == ALONE:
             size = s.count[LONE_SIZE]
-            entries, removes = lone_outcome(r - pairs, size, s.clock[CHANCE], s)
+            entries, removes = lone_outcome(r - pairs, size, s.count[LONE_PART], s)
             entries = rounded(s, entries, size, p)
             return entries, 1, 0.0, float(size) * stands(size, p) if removes else 0.0
         size = pick(s, windows, r)
         s.sizes[0], s.counts[0] = size, 1
         return 1, 0, float(size) * stands(size, p), 0.0
+
+    @cold_piece
+    def wanting(s, entries, q):
+        """Whether bounds of the splits of something that appears are to be asked for."""
+        for e in range(entries):
+            if not known(s.sizes[e], q):
+                s.count[WANTED] = s.sizes[e]
+                return True
+        return False
+
+    @cold_piece
+    def book(s, gone, i, j, entries, q):
+        """Bring the counts of single particles up to date."""
+        if gone & 1:
+            leave(s, i)
+        if gone & 2:
+            leave(s, j)
+        for e in range(entries):
+            enter(s, s.sizes[e], s.counts[e], q)
+
+    @piece
+    def vanishing(s, w):
+        """Sizes of what may vanish."""
+        if s.count[KIND] == PAIR:
+            return pair(s, w)
+        return s.count[LONE_SIZE], np.int64(0)
+
+    @piece
+    def exchange(s, w, windows, r, p, q):
+        """Carry out process `r`: 0, or the reason to return, with nothing changed."""
+        a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
+        i, j = vanishing(s, w)
+        entries, gone, come, left = result(s, w, windows, r, p, q)
+        highest = np.int64(0)
+        for e in range(entries):
+            highest = max(highest, s.sizes[e])
+        if highest >= LIMIT:
+            return TOO_LARGE
+        out, cut = s.clock[MASS_OUT], s.events[windows.cut[1]]
+        if highest > windows.cut[0]:
+            entries = cut_off(s, windows, entries, p)
+        reason = 0
+        if lones > 0 and wanting(s, entries, q.lone):
+            reason = SPLITS
+        elif not update(s, w, gone, entries, p):
+            reason = GROW
+        if reason != 0:
+            s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
+            s.clock[MASS_OUT], s.events[windows.cut[1]] = out, cut
+            return reason
+        if lones > 0:
+            book(s, gone, i, j, entries, q.lone)
+        for e in range(entries):
+            s.count[LARGEST] = max(s.count[LARGEST], s.sizes[e])
+        s.clock[MASS_IN] += come
+        s.clock[MASS_OUT] += left
+        s.attempts[windows.cut[1]] += s.events[windows.cut[1]] - cut
+        s.events[r] += 1
+        s.count[SINCE] += 1
+        return 0
 
     @piece
     def fire(s, w, windows, p, q):
@@ -222,26 +288,9 @@ def make_fire(
                     return BAD_FACTOR
                 s.count[PROCESS] = r
             if r >= 0:
-                a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
-                entries, gone, come, left = result(s, w, windows, r, p, q)
-                highest = np.int64(0)
-                for e in range(entries):
-                    highest = max(highest, s.sizes[e])
-                if highest >= LIMIT:
-                    return TOO_LARGE
-                out, cut = s.clock[MASS_OUT], s.events[windows.cut[1]]
-                if highest > windows.cut[0]:
-                    entries = cut_off(s, windows, entries, p)
-                if not update(s, w, gone, entries, p):
-                    s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
-                    s.clock[MASS_OUT], s.events[windows.cut[1]] = out, cut
-                    return GROW
-                for e in range(entries):
-                    s.count[LARGEST] = max(s.count[LARGEST], s.sizes[e])
-                s.clock[MASS_IN] += come
-                s.clock[MASS_OUT] += left
-                s.events[r] += 1
-                s.count[SINCE] += 1
+                reason = exchange(s, w, windows, r, p, q)
+                if reason != 0:
+                    return reason
                 if kind == PAIR:
                     s.count[EVENTS] += 1
         s.clock[TIME] = s.clock[PENDING]

@@ -1,7 +1,11 @@
 """Single particles: their rates, what comes of them, and how the next one is drawn.
 
-One is drawn with equal chance, and thinned by its rate over the greatest one of the sizes present.
-Rates are bounded for ranges of sizes, see `smolux.core.slots`.
+The particles are counted in slots of sizes, an eighth of an octave each, and every slot remembers
+the largest rate of what was in it since it was last empty. So the sum of the rates of all is known
+to within what rates differ in a slot, whatever a few large particles do. A slot is drawn by its
+sum, a particle in it with equal chance, and thinned by its own rate. The bounds are rates of sizes
+that are there, not of sizes that were tried: a rate that is not zero at one size only is not
+overlooked.
 """
 
 from __future__ import annotations
@@ -14,25 +18,27 @@ import numpy as np
 
 from . import rng
 from .compile import cold_piece, piece, user_piece
-from .loop import PATIENCE, ROUNDING, note_bad
-from .slots import slot_of
+from .loop import PATIENCE
+from .slots import slot_of, slot_top
+from .splits import bind_splits
 from .state import (
-    CHANCE,
     CLOCKS,
+    CULPRIT,
     LARGEST,
     LONE,
+    LONE_BITS,
+    LONE_PART,
+    LONE_PROCESS,
     LONE_SIZE,
     PARTICLES,
-    RAISED,
-    REPAIRS,
+    SPLITS,
     TRIALS,
+    VALUE,
+    WANTED,
     WINDOW,
     WORST_I,
     WORST_J,
 )
-
-#: classes an octave in which the rates of single particles are bounded, as a power of two
-CEILING_BITS = 3
 
 
 class Lone(NamedTuple):
@@ -45,61 +51,93 @@ class Lone(NamedTuple):
     removes: bool
 
 
-def _bind_rate(process: Lone) -> Any:
-    """Rate ``(size, u, parameters)`` of one process."""
-    law, least = user_piece(process.law), process.least
+class Rates(NamedTuple):
+    """Rates of all processes of single particles, bound; `q` is ``Parameters.lone``.
+
+    Attributes
+    ----------
+    total : ``total(r, size, s, q)``
+        Rate of process `r`, or an upper bound of it if it splits; NaN if there is none.
+    known : ``known(size, q)``
+        Whether all of them can be told, or bounds of splits are to be asked for.
+    part : ``part(r, size, s, q)``
+        What becomes of it: for one that splits a fragment, 0 if it comes to nothing, -1 for a rate
+        that is none; 1 for others.
+    """
+
+    total: Any
+    known: Any
+    part: Any
+
+
+def _bind_one(process: Lone) -> Rates:
     if process.splits:
-
-        @cold_piece
-        def split(size, u, q):
-            if size < 2:
-                return 0.0
-            i = np.int64(1) + np.int64(u * (size - 1))
-            return 0.5 * float(size - 1) * float(law(float(i), float(size - i), *q))
-
-        return split
+        total, known, part = bind_splits(process.law)
+        return Rates(total, known, part)
+    law, least = user_piece(process.law), process.least
 
     @cold_piece
-    def rate(size, u, q):
-        return float(law(float(size), *q)) if size >= least else 0.0
+    def rate(size, s, q):
+        return float(law(float(size), *q[0])) if size >= least else 0.0
 
-    return rate
+    @piece
+    def always(size, q):
+        return True
+
+    @piece
+    def whole(size, s, q):
+        return np.int64(1)
+
+    return Rates(rate, always, whole)
 
 
-def bind_rates(processes: Sequence[Lone]) -> Any:
-    """Bind ``rate(r, size, u, q)`` of all processes of single particles; 0 without any."""
+def bind_rates(processes: Sequence[Lone]) -> Rates:
+    """Bind the rates of all processes; without any, what is never called."""
     if not processes:
-
-        @piece
-        def none(r, size, u, q):
-            return 0.0
-
-        return none
-    first = _bind_rate(processes[0])
+        return Rates(None, None, None)
+    first = _bind_one(processes[0])
     if len(processes) == 1:
 
         @piece
-        def last(r, size, u, q):
-            return first(size, u, q[0])
+        def last_total(r, size, s, q):
+            return first.total(size, s, q[0])
 
-        return last
+        @piece
+        def last_known(size, q):
+            return first.known(size, q[0])
+
+        @piece
+        def last_part(r, size, s, q):
+            return first.part(size, s, q[0])
+
+        return Rates(last_total, last_known, last_part)
     others = bind_rates(processes[1:])
 
     @piece
-    def rate(r, size, u, q):
+    def total(r, size, s, q):
         if r == 0:
-            return first(size, u, q[0])
-        return others(r - 1, size, u, q[1:])
+            return first.total(size, s, q[0])
+        return others.total(r - 1, size, s, q[1:])
 
-    return rate
+    @piece
+    def known(size, q):
+        return first.known(size, q[0]) and others.known(size, q[1:])
+
+    @piece
+    def part(r, size, s, q):
+        if r == 0:
+            return first.part(size, s, q[0])
+        return others.part(r - 1, size, s, q[1:])
+
+    return Rates(total, known, part)
 
 
 def bind_outcomes(processes: Sequence[Lone]) -> Any:
-    """Bind ``outcome(r, size, u, s)``, and whether mass leaves by it."""
+    """Bind ``outcome(r, size, part, s)``, and whether mass leaves by it."""
     if not processes:
 
         @piece
-        def none(r, size, u, s):
+        def none(r, size, part, s):
             return 0, False
 
         return none
@@ -107,33 +145,115 @@ def bind_outcomes(processes: Sequence[Lone]) -> Any:
     if len(processes) == 1:
 
         @piece
-        def last(r, size, u, s):
-            return first(size, u, s.sizes, s.counts), removes
+        def last(r, size, part, s):
+            return first(size, part, s.sizes, s.counts), removes
 
         return last
     others = bind_outcomes(processes[1:])
 
     @piece
-    def outcome(r, size, u, s):
+    def outcome(r, size, part, s):
         if r == 0:
-            return first(size, u, s.sizes, s.counts), removes
-        return others(r - 1, size, u, s)
+            return first(size, part, s.sizes, s.counts), removes
+        return others(r - 1, size, part, s)
 
     return outcome
 
 
-def make_lone(lone: Callable[..., Any], rate: Callable[..., Any], pairs: int, count: int) -> Any:
+class Ledger(NamedTuple):
+    """The counts of the particles in slots.
+
+    Attributes
+    ----------
+    enter, leave : ``enter(s, size, count, q)``, ``leave(s, size)``
+    ready : ``ready(s, w, p, q)``
+        Count all if they are not counted: 0, or `SPLITS`.
+    """
+
+    enter: Any
+    leave: Any
+    ready: Any
+
+
+def make_ledger(rates: Rates, visit: Callable[[Any], Any], count: int) -> Ledger:
+    """Bind the counting; without any process, what is never called.
+
+    Parameters
+    ----------
+    rates : Rates
+    visit : callable
+        ``visit(tally)`` binds the visit of a method, see `smolux.core.loop.Pieces`, to a tally.
+    count : int
+        How many processes of single particles there are.
+    """
+    if count == 0:
+        return Ledger(None, None, None)
+    total, known = rates.total, rates.known
+
+    @piece
+    def add_up(s, c):
+        """Sum afresh what changed: nothing drifts."""
+        o = c >> LONE_BITS
+        for r in range(count):
+            own = 0.0
+            for k in range(o << LONE_BITS, (o + 1) << LONE_BITS):
+                # slot 0 holds no size, but whether all are counted
+                own += s.held[k] * s.most[r, k] if k > 0 else 0.0
+            s.sums[r, o] = own
+
+    @cold_piece
+    def enter(s, size, number, q):
+        c = slot_of(size, np.int64(LONE_BITS))
+        for r in range(count):
+            value = total(r, size, s, q)
+            if 0.0 <= value < math.inf:
+                s.most[r, c] = max(value, s.most[r, c])
+            else:  # found when the next event is drawn
+                s.most[r, c] = math.nan
+                s.count[WORST_I], s.count[WORST_J], s.count[CULPRIT] = size, 0, r + 1
+                s.clock[VALUE] = value
+        s.held[c] += number
+        add_up(s, c)
+
+    @cold_piece
+    def leave(s, size):
+        c = slot_of(size, np.int64(LONE_BITS))
+        s.held[c] -= 1
+        if s.held[c] == 0:
+            for r in range(count):
+                s.most[r, c] = 0.0
+        add_up(s, c)
+
+    @cold_piece
+    def enter_if_known(s, q, size, number, p):
+        """As a tally, which takes what it adds to and what it needs for that first."""
+        if known(size, q):
+            enter(s, size, number, q)
+        else:
+            s.count[WANTED] = size
+
+    count_all = visit(enter_if_known)
+
+    @cold_piece
+    def ready(s, w, p, q):
+        if s.held[0] == 1:
+            return 0
+        s.held[:] = 0
+        s.most[:, :] = 0.0
+        s.sums[:, :] = 0.0
+        s.count[WANTED] = 0
+        count_all(s, w, s, q, p)
+        if s.count[WANTED] > 0:
+            return SPLITS
+        s.held[0] = 1
+        return 0
+
+    return Ledger(enter, leave, ready)
+
+
+def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) -> Any:
     """Bind the drawing of the next event of a single particle: the waiting time, NaN if no rate."""
-
-    @cold_piece
-    def note(s, size, value):
-        note_bad(s, size, np.int64(0), value)
-
-    @cold_piece
-    def repair(s, size, factor):
-        s.count[REPAIRS] += 1
-        s.count[WORST_I], s.count[WORST_J] = size, 0
-        s.clock[RAISED] = max(s.clock[RAISED], 1.1 * factor - 1.0)
+    total, part = rates.total, rates.part
 
     @piece
     def factor_bound(s, windows, r):
@@ -141,40 +261,67 @@ def make_lone(lone: Callable[..., Any], rate: Callable[..., Any], pairs: int, co
         return windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
 
     @cold_piece
+    def find_slot(s, windows, octaves, x):
+        """Process and slot at which the cumulative sum passes `x`."""
+        process, slot = np.int64(0), np.int64(0)
+        for r in range(count):
+            factor = factor_bound(s, windows, r)
+            for o in range(octaves):
+                own = factor * s.sums[r, o]
+                if own <= 0.0:
+                    continue
+                inside = x < own
+                for c in range(o << LONE_BITS, (o + 1) << LONE_BITS):
+                    value = factor * s.held[c] * s.most[r, c]
+                    if c > 0 and value > 0.0:
+                        process, slot = np.int64(r), np.int64(c)
+                        if inside and x < value:
+                            break
+                        x -= value if inside else 0.0
+                if inside:
+                    return process, slot
+                x -= own
+        return process, slot
+
+    @piece
+    def accepted(s, value, most):
+        return value >= most or rng.uniform(s.rng) * most < value
+
+    @cold_piece
     def draw_lone(s, w, windows, q):
         s.count[LONE] = -1
-        n = s.count[PARTICLES]
-        if n == 0:
+        if s.count[PARTICLES] == 0:
             return math.inf
-        slot = slot_of(s.count[LARGEST], np.int64(CEILING_BITS))
-        most = 0.0
+        octaves = (slot_of(s.count[LARGEST], np.int64(LONE_BITS)) >> LONE_BITS) + 1
+        rate = 0.0
         for r in range(count):
-            most += factor_bound(s, windows, r) * windows.ceiling[r, slot]
-        most *= 1.0 + s.clock[RAISED]
-        if not most < math.inf:
-            note(s, s.count[LARGEST], most)
+            own = 0.0
+            for o in range(octaves):
+                own += s.sums[r, o]
+            rate += factor_bound(s, windows, r) * own
+        if not rate < math.inf:
             return math.nan
-        if most <= 0.0:
+        if rate <= 0.0:
             return math.inf
         wait = 0.0
         for _ in range(PATIENCE):
-            s.count[TRIALS] += 1
             wait += rng.exponential(s.rng)
-            one, size = lone(s, w, rng.below(s.rng, n))
-            u = rng.uniform(s.rng)
-            total = 0.0
-            for r in range(count):
-                value = rate(r, size, u, q.lone)
-                if not 0.0 <= value < math.inf:
-                    note(s, size, value)
-                    return math.nan
-                total += factor_bound(s, windows, r) * value
-            if total > most * ROUNDING:
-                repair(s, size, total / most * (1.0 + s.clock[RAISED]))
-            if rng.uniform(s.rng) * most < total:
+            r, c = find_slot(s, windows, octaves, rng.uniform(s.rng) * rate)
+            before = s.count[TRIALS]
+            s.count[TRIALS] += 1
+            high = slot_top(c, np.int64(LONE_BITS))
+            one, size = pick(s, w, slot_top(c - 1, np.int64(LONE_BITS)) + 1, high, s.held[c])
+            piece_of_it = np.int64(0)
+            if accepted(s, total(r, size, s, q), s.most[r, c]):
+                piece_of_it = part(r, size, s, q)
+            s.attempts[pairs + r] += s.count[TRIALS] - before
+            if piece_of_it < 0:
+                s.count[CULPRIT] = r + 1
+                return math.nan
+            if piece_of_it > 0:
                 s.count[LONE], s.count[LONE_SIZE] = one, size
-                s.clock[CHANCE] = u
+                s.count[LONE_PROCESS], s.count[LONE_PART] = r, piece_of_it
                 break
-        return wait / (float(n) * most)
+        return wait / rate
 
     return draw_lone

@@ -28,6 +28,7 @@ from .state import (
     BAD_RATE,
     BUDGET,
     CLOCKS,
+    CULPRIT,
     DONE,
     DOUBLE_AT,
     DOUBLINGS,
@@ -130,13 +131,14 @@ class Pieces(NamedTuple):
         Bring bounds up to date; 0 or the reason to return.
     double : ``double(s, w)``
         Put every particle in once more; False, with nothing changed, if there is no room.
-    lone : ``lone(s, w, k)``
-        Place and size of particle `k`, ``0 <= k < count[PARTICLES]``, in any order.
+    pick : ``pick(s, w, low, high, n)``
+        Place and size of one of the `n` particles of the sizes `low` to `high`, a slot of
+        `smolux.core.slots` or part of one; each with equal chance.
     seize : ``seize(s, w, place)``
         Put that particle in the place of the first of the pair.
     visit : ``visit(s, w, t, grid, p)``
-        Call the `tally` that `Method.bind` was given for the particles present, and return the
-        largest size.
+        Call the `tally` that `Method.bind` was given for the particles present, with all but
+        `s` and `w`, and return the largest size.
     burst : Burst or None
         How the method carries out plain events in a row, if it can.
     """
@@ -147,7 +149,7 @@ class Pieces(NamedTuple):
     update: Any
     prepare: Any
     double: Any
-    lone: Any
+    pick: Any
     seize: Any
     visit: Any
     burst: Burst | None = None
@@ -297,6 +299,8 @@ def make_loop(
                     s.clock[MASS_OUT] *= 2.0
                     s.count[DOUBLINGS] += 1
                     s.clock[EXTINCT] = math.nan
+                    if s.held.shape[0] > 0:
+                        s.held[0] = 0
                 reason = prepare(s, w, p)
                 if reason != 0:
                     return reason
@@ -349,6 +353,10 @@ def make_loop(
                 state.events[r],
                 state.sizes[r],
                 state.counts[r],
+                state.attempts[r],
+                state.held[r],
+                state.most[r],
+                state.sums[r],
             )
             t = Tally(
                 tally.scalars[r], tally.events[r], tally.counts[r], tally.bins[r], tally.sums[r]
@@ -371,7 +379,7 @@ def repair(s, i, j, value):
 @cold_piece
 def note_bad(s, i, j, value):
     """Note a rate that is negative, infinite or undefined: the run cannot go on."""
-    s.count[WORST_I], s.count[WORST_J] = i, j
+    s.count[WORST_I], s.count[WORST_J], s.count[CULPRIT] = i, j, 0
     s.clock[VALUE] = value
 
 

@@ -28,9 +28,13 @@ REPAIRS = 17  # rates found above their bound
 WORST_I = 18  # sizes of the latest such pair, or of a rate that is no rate
 WORST_J = 19
 KIND = 20  # of the pending event, see `smolux.core.beside`
-LONE = 21  # the single particle of the pending event, and its size
+LONE = 21  # the single particle of the pending event, its size, its process, one of two fragments
 LONE_SIZE = 22
-COUNTS = 23
+LONE_PROCESS = 23
+LONE_PART = 24
+CULPRIT = 25  # whose rate is no rate: 0 the kernel, r + 1 process r of single particles
+WANTED = 26  # the size of which the splits are to be bounded
+COUNTS = 27
 
 # Entries of State.clock.
 TIME = 0  # of the latest event
@@ -43,9 +47,8 @@ VALUE = 6  # the value that broke a bound
 EXCESS = 7  # sum of what follows
 MASS_IN = 8  # what sources have brought in, and what has left, in the volume of now
 MASS_OUT = 9
-CHANCE = 10  # the number that decides what becomes of a single particle
-RAISED = 11  # by which share the bounds of rates of single particles were found too low
-CLOCKS = 12  # from here on, for each process: what repairs have added to the bounds of its factor
+RAISED = 10  # by which share bounds of splits were found too low
+CLOCKS = 11  # from here on, for each process: what repairs have added to the bounds of its factor
 
 #: sizes stay below this, so that a sum of two cannot overflow
 LIMIT = 1 << 62
@@ -61,6 +64,11 @@ BAD_RATE = 4  # a negative or undefined rate
 BAD_FACTOR = 5  # a negative or undefined factor of a process
 PAUSED = 6  # an output time was recorded
 TOO_LARGE = 7  # a size would reach the limit
+SPLITS = 8  # bounds of the splits of a size are asked for
+
+#: slots an octave by which single particles are told apart, as a power of two, and how many in all
+LONE_BITS = 3
+LONE_SLOTS = 61 << LONE_BITS
 
 
 class State(NamedTuple):
@@ -75,6 +83,15 @@ class State(NamedTuple):
         Collisions that ended in each process.
     sizes, counts : int64 arrays of shape (R, E)
         What the latest event made, see `smolux.processes.base.PairProcess.outcome`.
+    attempts : int64 array of shape (R, P)
+        Candidates of single particles, and particles that sources offered.
+    held : int64 array of shape (R, slots)
+        Particles in each slot of sizes; entry 0 is 1 if they are counted. No slots if nothing
+        happens to single particles.
+    most : float64 array of shape (R, L, slots)
+        Largest rate of a particle since its slot was last empty, for each process of these.
+    sums : float64 array of shape (R, L, octaves)
+        Sums of ``held * most`` over the slots of an octave.
     """
 
     rng: np.ndarray
@@ -83,6 +100,10 @@ class State(NamedTuple):
     events: np.ndarray
     sizes: np.ndarray
     counts: np.ndarray
+    attempts: np.ndarray
+    held: np.ndarray
+    most: np.ndarray
+    sums: np.ndarray
 
 
 class Windows(NamedTuple):
@@ -95,8 +116,6 @@ class Windows(NamedTuple):
     bounds : float64 array of shape (W, P)
     total : float64 array of shape (W,)
         Sum of the bounds over the processes of pairs.
-    ceiling : float64 array of shape (L, slots)
-        Bounds of the rates of single particles up to a size, for each process of them.
     inflow : float64 array of shape (S,)
         Simulated particles that each source brings in for a unit of volume and time.
     size : int64 array of shape (S, K)
@@ -109,7 +128,6 @@ class Windows(NamedTuple):
     edges: np.ndarray
     bounds: np.ndarray
     total: np.ndarray
-    ceiling: np.ndarray
     inflow: np.ndarray
     size: np.ndarray
     share: np.ndarray
@@ -124,7 +142,7 @@ class Parameters(NamedTuple):
     factors, outcomes : tuple
         Of pairs: of the factors in time, and of what comes of an encounter.
     lone, lone_factors : tuple
-        Of single particles: of the rates, and of the factors.
+        Of single particles: of the rates, see `smolux.core.lone.Law`, and of the factors.
     source_factors : tuple
     """
 
@@ -170,9 +188,13 @@ class Grid(NamedTuple):
     first: np.ndarray
 
 
-def new_state(rng: np.ndarray, processes: int, entries: int) -> State:
-    """Make an empty state for as many replicas as there are streams."""
+def new_state(rng: np.ndarray, processes: int, entries: int, lone: int) -> State:
+    """Make an empty state for as many replicas as there are streams.
+
+    `lone` of the processes are of single particles.
+    """
     replicas = len(rng)
+    slots = LONE_SLOTS if lone else 0
     return State(
         rng,
         np.zeros((replicas, CLOCKS + processes)),
@@ -180,6 +202,10 @@ def new_state(rng: np.ndarray, processes: int, entries: int) -> State:
         np.zeros((replicas, processes), np.int64),
         np.zeros((replicas, entries), np.int64),
         np.zeros((replicas, entries), np.int64),
+        np.zeros((replicas, processes), np.int64),
+        np.zeros((replicas, slots), np.int64),
+        np.zeros((replicas, lone, slots)),
+        np.zeros((replicas, lone, slots >> LONE_BITS)),
     )
 
 

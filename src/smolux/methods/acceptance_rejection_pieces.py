@@ -25,6 +25,7 @@ from ..core.state import (
     SINCE,
     SMALLEST,
     STORED,
+    TRIALS,
     VALUE,
     VOLUME,
 )
@@ -89,9 +90,16 @@ def _pair(s, w):
     return _size(w, monomers, s.count[FIRST]), _size(w, monomers, s.count[SECOND])
 
 
-@piece
-def _lone(s, w, k):
-    return k, _size(w, s.count[MONOMERS], k)
+@cold_piece
+def _pick(s, w, low, high, n):
+    if high == 1:
+        return rng.below(s.rng, n), np.int64(1)
+    # they lie anywhere
+    while True:
+        k = rng.below(s.rng, s.count[STORED])
+        if low <= w.sizes[k] <= high:
+            return s.count[MONOMERS] + k, w.sizes[k]
+        s.count[TRIALS] += 1
 
 
 @piece
@@ -361,7 +369,7 @@ def bind(rate: Any, tally: Any) -> Pieces:
         _update,
         _prepare,
         _double,
-        _lone,
+        _pick,
         _seize,
         _make_visit(tally),
         Burst(_row, _hold, find, _replace, _release),

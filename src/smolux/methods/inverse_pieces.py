@@ -12,7 +12,7 @@ from ..core.compile import cold_piece, piece
 from ..core.loop import Pieces, note_bad, note_largest
 from ..core.state import FIRST, LARGEST, PARTICLES, SECOND, SINCE, STORED, TRIALS, VALUE, VOLUME
 from ..core.sums import find, find_large, shift, weigh
-from .inverse_store import double, lone, make_visit, pair, remove, seize, size_at, top_of, view
+from .inverse_store import double, make_visit, pair, pick, remove, seize, size_at, top_of, view
 
 #: events after which the sums are computed afresh, so that rounding does not pile up
 _REFRESH = 1 << 16
@@ -289,7 +289,7 @@ def bind(rate: Any, tally: Any) -> Pieces:
         _make_update(pair_rate, row_of, own_rate, look),
         _make_prepare(renew),
         double,
-        lone,
+        pick,
         seize,
         make_visit(tally),
     )

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core import rng
 from ..core.compile import cold_piece, piece
 from ..core.state import FIRST, LARGEST, PARTICLES, SECOND, SINCE, STORED
 
@@ -70,16 +71,19 @@ def pair(s, w):
 
 
 @cold_piece
-def lone(s, w, k):
-    """Slot and size of particle `k`."""
-    left, slot = float(k), 0
-    while slot < w.table.shape[1]:
+def pick(s, w, low, high, n):
+    """Slot and size of a particle of the sizes `low` to `high`, of which there are `n`."""
+    left, buckets = rng.below(s.rng, n), w.table.shape[1]
+    for slot in range(low - 1, min(high, buckets)):
         if left < w.number[slot]:
             return np.int64(slot), np.int64(slot + 1)
-        left -= w.number[slot]
-        slot += 1
-    place = slot + np.int64(left)
-    return place, size_at(w, place)
+        left -= np.int64(w.number[slot])
+    for d in range(s.count[STORED]):
+        if low <= w.large[d] <= high:
+            if left == 0:
+                return np.int64(buckets + d), w.large[d]
+            left -= 1
+    return np.int64(-1), np.int64(0)  # never reached
 
 
 @piece

@@ -23,7 +23,7 @@ from ..core.state import (
 )
 from ..errors import InputError
 from .base import Int, Method, Rates, enlarged, spread
-from .low_rank_pieces import lone, make_draw, pair, prepare, seize, update
+from .low_rank_pieces import make_draw, pair, pick, prepare, seize, update
 from .low_rank_store import (
     METAS,
     POOL_NEEDED,
@@ -88,7 +88,7 @@ class LowRank(Method):
     def bind(rate: Any, tally: Any) -> Pieces:
         """See `Method.bind`."""
         visit = make_visit(tally)
-        return Pieces(view, make_draw(rate), pair, update, prepare, double, lone, seize, visit)
+        return Pieces(view, make_draw(rate), pair, update, prepare, double, pick, seize, visit)
 
     def _tables(self, rates: Rates) -> tuple[Tables, np.ndarray, int]:
         """Return tables, an array for bounds of the kernel and the bits in use."""

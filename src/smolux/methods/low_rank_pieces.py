@@ -131,14 +131,24 @@ def _pair_by_term(s, w, stage, total):
 
 
 @cold_piece
-def lone(s, w, k):
-    """Place and size of particle `k`: the number in its slot, and the slot above these bits."""
-    left, slot = float(k), np.int64(1)
-    while left >= w.number[slot]:
-        left -= w.number[slot]
-        slot += 1
-    place = np.int64(left)
-    return (slot << _PLACE_BITS) | place, size_at(w, slot, place)
+def pick(s, w, low, high, n):
+    """Place and size of a particle of the sizes `low` to `high`, of which there are `n`.
+
+    A place is the number of the particle in its slot, with the slot above these bits.
+    """
+    first, last = slot_for(w, low), min(slot_for(w, high), w.number.shape[0] - 1)
+    total = np.int64(0)
+    for slot in range(first, last + 1):
+        total += np.int64(w.number[slot])
+    while True:
+        left, slot = rng.below(s.rng, total), first
+        while left >= w.number[slot]:
+            left -= np.int64(w.number[slot])
+            slot += 1
+        size = size_at(w, slot, left)
+        if low <= size <= high:  # slots may be wider than what is asked for
+            return (slot << _PLACE_BITS) | left, size
+        s.count[TRIALS] += 1
 
 
 @piece

@@ -12,10 +12,11 @@ from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
 from ..core.loop import PATIENCE, ROUNDING, Pieces, note_bad, repair
 from ..core.prefetch import prefetch
-from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, VOLUME
+from ..core.slots import slot_of
+from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, TRIALS, VOLUME
 from ..core.wide import upper_half
 from .size_class_lists import place_in, place_of_particle, size_at, size_of_particle
-from .size_class_state import AHEAD, BLOCK, FREE, NEXT, PAIRS, SLOT, SLOT_BITS, STALE, view
+from .size_class_state import AHEAD, BITS, BLOCK, FREE, NEXT, PAIRS, SLOT, SLOT_BITS, STALE, view
 from .size_class_store import chunks_for, double, insert, listed, make_visit, remove
 from .size_class_table import prepare
 
@@ -26,13 +27,21 @@ def _pair(s, w):
 
 
 @cold_piece
-def _lone(s, w, k):
-    g = np.int64(1)
-    while k >= w.number[g]:
-        k -= w.number[g]
-        g += 1
-    one = (g << SLOT_BITS) | k
-    return one, size_of_particle(w, one)
+def _pick(s, w, low, high, n):
+    first, last = slot_of(low, w.meta[BITS]), slot_of(high, w.meta[BITS])
+    total = np.int64(0)
+    for g in range(first, min(last + 1, w.number.shape[0])):
+        total += w.number[g]
+    while True:
+        k, g = rng.below(s.rng, total), first
+        while k >= w.number[g]:
+            k -= w.number[g]
+            g += 1
+        one = (g << SLOT_BITS) | k
+        size = size_of_particle(w, one)
+        if low <= size <= high:  # classes may be wider than what is asked for
+            return one, size
+        s.count[TRIALS] += 1
 
 
 @piece
@@ -218,7 +227,7 @@ def bind(rate: Any, tally: Any) -> Pieces:
         _update,
         prepare,
         double,
-        _lone,
+        _pick,
         _seize,
         make_visit(tally),
         Burst(_row, _hold, find, _replace, _release),

@@ -87,17 +87,17 @@ class PairProcess(Process):
 class LoneProcess(Process):
     """What happens to a particle by itself, at a rate that depends on its size.
 
-    The rate may also depend on a number u, uniform in [0, 1), that decides between outcomes: its
-    mean over u is the rate of the size. The particle vanishes; `outcome` names what appears.
+    The particle vanishes; `outcome` names what appears.
     """
 
     kind: ClassVar[int] = 1
     #: the smallest size to which it happens
     least: ClassVar[int] = 1
 
-    #: ``outcome(k, u, sizes, counts) -> int``: as that of a `PairProcess`
+    #: ``outcome(k, part, sizes, counts) -> int``: as that of a `PairProcess`; `part` is one of both
+    #: fragments of a process that `splits`
     outcome: ClassVar[Callable[..., Any]]
-    #: whether `law` is that of a pair of fragments, ``F(i, k - i)``, of which u chooses one
+    #: whether `law` is that of a pair of fragments, ``F(i, k - i)``
     splits: ClassVar[bool] = False
 
     @property
@@ -110,8 +110,20 @@ class LoneProcess(Process):
         """What `law` takes last."""
         raise NotImplementedError
 
-    def ceiling(self, low: Float, high: Float) -> Float:
-        """Upper bounds of the rate, for every u, over ranges of sizes."""
+    def split_bounds(self, low: Float, high: Float) -> tuple[Float, Float, Float]:
+        """Bounds of the law of a process that `splits`, over ranges of sizes of one octave.
+
+        The bins of splits are those of `smolux.core.splits.stretch`.
+
+        Returns
+        -------
+        bounds : ndarray of shape (ranges, bins)
+            Upper bounds.
+        widths : ndarray of shape (ranges, bins)
+            Splits of the largest size.
+        means : ndarray of shape (ranges, bins)
+            Rough mean of the law for the smallest size, to tell whether the bounds are far off.
+        """
         raise NotImplementedError
 
     def rates(self, sizes: Float) -> Float:

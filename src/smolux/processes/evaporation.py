@@ -13,7 +13,7 @@ from ..errors import InputError
 from .base import Float, LoneProcess, RatedBySize
 
 
-def _evaporate(k: int, u: float, sizes: Any, counts: Any) -> int:
+def _evaporate(k: int, part: int, sizes: Any, counts: Any) -> int:
     if k == 2:
         sizes[0], counts[0] = 1, 2
         return 1
@@ -58,11 +58,6 @@ class Evaporation(RatedBySize, LoneProcess):
     def entries(self) -> int:
         """See `Process.entries`."""
         return 2
-
-    def ceiling(self, low: Float, high: Float) -> Float:
-        """See `LoneProcess.ceiling`."""
-        bound = self.of_size.bounds(np.maximum(low, 2.0), np.maximum(high, 2.0))[1]
-        return np.where(high >= 2.0, bound, 0.0)
 
     def rates(self, sizes: Float) -> Float:
         """See `LoneProcess.rates`."""

@@ -9,27 +9,26 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..callables import spread
 from ..checks import is_number
 from ..errors import InputError
-from ..intervals import Interval
 from ..kernels import Constant, formula, from_dict, from_function
-from ..kernels.base import Kernel, widen
+from ..kernels.base import Kernel
 from ..kernels.numeric import SAFETY
 from .base import Float, LoneProcess, Varying
 
 #: entries of the law that are handled at once; sizes for which all are kept
 _BLOCK, _KEPT = 1 << 22, 1 << 12
-#: where the half of a diagonal is cut: by octaves, then in equal lengths
-_SHARES = np.concatenate(([0.0], 2.0 ** np.arange(-61.0, -3.0), np.arange(2.0, 17.0) / 16.0))
+#: splits of a bin that are tried
+_TRIED = 32
 
 
-def _split(k: int, u: float, sizes: Any, counts: Any) -> int:
-    i = 1 + int(u * (k - 1))
-    sizes[0], counts[0] = i, 1
-    if i == k - i:
+def _split(k: int, part: int, sizes: Any, counts: Any) -> int:
+    sizes[0], counts[0] = part, 1
+    if part == k - part:
         counts[0] = 2
         return 1
-    sizes[1], counts[1] = k - i, 1
+    sizes[1], counts[1] = k - part, 1
     return 2
 
 
@@ -106,9 +105,17 @@ class Fragmentation(Varying, LoneProcess):
         """See `LoneProcess.parameters`."""
         return self.pairs.parameters
 
-    def ceiling(self, low: Float, high: Float) -> Float:
-        """See `LoneProcess.ceiling`."""
-        return 0.5 * (high - 1.0) * _along_diagonals(self.pairs, low, high)
+    def split_bounds(self, low: Float, high: Float) -> tuple[Float, Float, Float]:
+        """See `LoneProcess.split_bounds`."""
+        (a, b, c, d), widths = _bins(low, high)
+        bound = np.asarray(self.pairs.bounds(a, b, c, d)[1])
+        # in no step with any period
+        i = np.rint(a + (b - a) * spread(_TRIED)[:, None, None])
+        sizes = low[:, None] + np.arange(2.0)[:, None, None, None]  # an even one and an odd one
+        found = np.nan_to_num(self.pairs(i, np.maximum(sizes - i, 1.0)), posinf=0.0)
+        # intervals may find no bound: then by trial, and raised where a rate is above
+        bound = np.where(np.isfinite(bound), bound, SAFETY * found.max(axis=(0, 1)))
+        return bound, widths, found.mean(axis=1).min(axis=0)
 
     def rates(self, sizes: Float) -> Float:
         """See `LoneProcess.rates`."""
@@ -136,47 +143,25 @@ class Fragmentation(Varying, LoneProcess):
         return np.concatenate(blocks)
 
 
-def _along_diagonals(law: Kernel, low: Float, high: Float) -> Float:
-    """Bound ``F(i, k - i)`` over all i, for the sizes k in ranges.
+def _bins(low: Float, high: Float) -> tuple[tuple[Float, Float, Float, Float], Float]:
+    """Return the boxes of both fragments, the smaller first, in the bins of ranges of sizes.
 
-    Over all i and j below k it would be far above: F(1, 1) of small pieces, where a law falls.
-    Each diagonal is covered by narrow boxes; F is symmetric, so i goes to half of k only.
+    And how many splits of the largest size each has. Over all i and j below k a law would be
+    bounded far too high: by F(1, 1) of small pieces, where it falls. Only i + j = k can occur, to
+    which narrow bins come close.
     """
-    half = np.maximum(np.floor(0.5 * high), 1.0)
-    x, y = half * _SHARES[:-1, None], half * _SHARES[1:, None]
-    slot = np.broadcast_to(np.arange(len(high)), x.shape)
-    held = y >= 1.0
-    slot, a = slot[held], np.maximum(np.floor(x[held]), 1.0)
-    b = np.maximum(np.ceil(y[held]), a)
-    c, d = np.maximum(low[slot] - b, 1.0), np.maximum(high[slot] - a, 1.0)
-    try:
-        found = law.interval(Interval(a, b), Interval(c, d))
-    except TypeError:  # the law is known by its values only
-        return _sampled(law, low, high)
-    # a bare number if the law does not depend on the sizes
-    upper = np.broadcast_to(found.hi if isinstance(found, Interval) else float(found), a.shape)
-    bound = np.zeros(high.shape)
-    np.maximum.at(bound, slot, widen(upper, upper)[1])
-    open_ = ~np.isfinite(bound)
-    if open_.any():
-        bound[open_] = _sampled(law, low[open_], high[open_])
-    return bound
-
-
-def _sampled(law: Kernel, low: Float, high: Float) -> Float:
-    """Largest value found over the smallest and the largest size of each range, widened.
-
-    Of ranges of several sizes one of these is even and the other odd, so halves are tried.
-    """
-    largest = np.zeros(high.shape)
-    for k in (low, high):
-        i = np.ceil(np.floor(0.5 * k) * _SHARES[1:, None])
-        _, slot = np.nonzero(i >= 1.0)
-        i, slot = np.unique(np.stack([i[i >= 1.0], slot]), axis=1)
-        slot = slot.astype(int)
-        value = law(i, k[slot] - i)
-        np.maximum.at(largest, slot, np.where(np.isnan(value), 0.0, value))
-    return SAFETY * largest
+    ends = 2.0 ** np.arange(int(np.log2(low[0])) - 1)
+    low, high = low[:, None], high[:, None]
+    half, most = np.floor(low / 2.0), np.floor(high / 2.0)
+    # 1, 2 and 3, 4 to 7, ... up to a quarter; half; and from there 1, 2 and 3, ... below
+    top = np.minimum(2.0 * ends - 1.0, np.floor(most / 2.0))
+    deep = np.minimum(2.0 * ends - 1.0, np.ceil(most / 2.0) - 1.0)
+    a = np.hstack([np.broadcast_to(ends, top.shape), half, np.maximum(half - deep, 1.0)])
+    b = np.hstack([top, most, most - ends])
+    c = np.hstack([low - top, low - half, low - half + ends])
+    d = np.hstack([high - ends, high - most, high - most + deep])
+    widths = np.hstack([top - ends + 1.0, np.ones(half.shape), np.maximum(deep - ends + 1.0, 0.0)])
+    return (np.minimum(a, b), b, np.minimum(c, d), d), widths
 
 
 def _rows(law: Kernel, first: int, last: int, largest: int) -> Float:

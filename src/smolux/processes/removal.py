@@ -13,7 +13,7 @@ from ..errors import InputError
 from .base import Float, LoneProcess, RatedBySize
 
 
-def _vanish(k: int, u: float, sizes: Any, counts: Any) -> int:
+def _vanish(k: int, part: int, sizes: Any, counts: Any) -> int:
     return 0
 
 
@@ -66,10 +66,6 @@ class Removal(RatedBySize, LoneProcess):
             )
         if problems:
             raise InputError(problems)
-
-    def ceiling(self, low: Float, high: Float) -> Float:
-        """See `LoneProcess.ceiling`."""
-        return self.of_size.bounds(low, high)[1]
 
     def rates(self, sizes: Float) -> Float:
         """See `LoneProcess.rates`."""
