@@ -7,13 +7,28 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .core.state import CLOCKS, DOUBLINGS, EXTINCT, FLOOR, REPAIRS, TRIALS, WORST_I, WORST_J
+from .core.splits import EXACT
+from .core.state import (
+    CLOCKS,
+    DOUBLINGS,
+    EXTINCT,
+    FLOOR,
+    RAISED,
+    REPAIRS,
+    TRIALS,
+    WORST_I,
+    WORST_J,
+)
 from .plan import Plan
+from .processes.base import LoneProcess, PairProcess
 from .records import Records
 from .replicas import Group
 from .subvolumes import Divided
 
 Float = NDArray[np.float64]
+
+#: share of candidates that become events, below which a run of so many of them warns
+_RARE, _MANY = 1e-3, 1e5
 
 
 def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
@@ -57,6 +72,7 @@ def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
         n=stood / v,
         n_bin=bins[:, :, :used] / v,
         events=events,
+        attempts=_attempts(plan, groups),
         extinction_time=clock[:, EXTINCT],
         distribution=[rows for g in groups for rows in g.distribution]
         if plan.distribution
@@ -65,6 +81,45 @@ def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
         attributes=_attributes(plan, groups),
         warnings=_warnings(plan, groups, int(missing.any(axis=1).sum())),
     )
+
+
+def _attempts(plan: Plan, groups: Sequence[Group | Divided]) -> Float:
+    """Candidates for each process, of shape (R, P).
+
+    Which process an encounter belongs to is decided last: its candidates are shared among the
+    processes of pairs in the ratio of their events.
+    """
+    found = np.concatenate([g.state.attempts for g in groups]).astype(float)
+    pairs = sum(isinstance(process, PairProcess) for process in plan.model.processes)
+    alone = pairs + sum(isinstance(process, LoneProcess) for process in plan.model.processes)
+    if pairs:
+        trials = np.concatenate([g.state.count[:, TRIALS] for g in groups])
+        events = np.concatenate([g.state.events[:, :pairs] for g in groups]).astype(float)
+        total = events.sum(axis=1, keepdims=True)
+        share = np.divide(events, total, out=np.full(events.shape, 1 / pairs), where=total > 0)
+        found[:, :pairs] = share * (trials - found[:, pairs:alone].sum(axis=1))[:, None]
+    return found
+
+
+def _rarely_accepted(plan: Plan, groups: Sequence[Group | Divided]) -> list[str]:
+    """Warn of processes for which nearly all candidates come to nothing."""
+    attempts = _attempts(plan, groups).sum(axis=0)
+    events = np.concatenate([g.state.events for g in groups]).sum(axis=0)
+    found = []
+    for process, tried, done in zip(plan.model.processes, attempts, events, strict=True):
+        # after every event of any kind a candidate for an encounter is drawn afresh
+        each = events.sum() if isinstance(process, PairProcess) else done
+        if tried >= _MANY and each < _RARE * tried:
+            cure = (
+                "another method, or 'auto', may be much faster"
+                if isinstance(process, PairProcess)
+                else "its rate differs much among sizes or splits that are nearly the same"
+            )
+            found.append(
+                f"{process.name}: {tried:.3g} candidates for {done} events, fewer than 1 in "
+                f"{1 / _RARE:g}; the result is right, but took long: {cure}"
+            )
+    return found
 
 
 def _number_density(
@@ -138,6 +193,15 @@ def _warnings(plan: Plan, groups: Sequence[Group | Divided], unfinished: int) ->
             "was raised from there on. A kernel written as a formula, or bounds= of from_function "
             "that hold, have no such error"
         )
+    if clock[:, RAISED].any():
+        broken = " and ".join(
+            p.name for p in plan.model.processes if isinstance(p, LoneProcess) and p.splits
+        )
+        found.append(
+            f"the rate of {broken} was found {(1.0 + clock[:, RAISED].max()) / 1.1:.3g} times as "
+            f"high as its sampled bound, for a size above {EXACT}; the bound was raised from there "
+            "on: a formula in i and j has proved bounds"
+        )
     raised = clock[:, CLOCKS:] > 0
     for process, replicas in zip(plan.model.processes, raised.sum(axis=0), strict=True):
         if replicas:
@@ -146,6 +210,7 @@ def _warnings(plan: Plan, groups: Sequence[Group | Divided], unfinished: int) ->
                 f"bound in {replicas} of {len(raised)} replicas; the bound was raised from there "
                 "on: a formula in t has proved bounds"
             )
+    found += _rarely_accepted(plan, groups)
     extinct = clock[:, EXTINCT]
     ended = int(np.isfinite(extinct).sum())
     if ended:

@@ -31,6 +31,8 @@ class Records:
         L.
     events : ndarray of shape (R, T, P)
         Collisions so far that ended in each of `processes`.
+    attempts : ndarray of shape (R, P), optional
+        Candidates for these up to the end, whether anything came of them or not.
     extinction_time : ndarray of shape (R,)
         When all particles had become one cluster; NaN if they had not.
     balance : tuple of ndarray of shape (R, T), optional
@@ -54,6 +56,7 @@ class Records:
     n_bin: Float
     events: Float
     extinction_time: Float
+    attempts: Float | None = None
     balance: tuple[Float, Float, Float] | None = None
     distribution: list[list[tuple[Int, Int]]] | None = None
     #: further attributes of the result: method, seed, wall time, ...

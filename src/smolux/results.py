@@ -42,6 +42,7 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str]] = {
     "n": (("replica", "time", "size"), "number density of clusters of one size"),
     "n_bin": (("replica", "time", "bin"), "number density of clusters in a bin of sizes"),
     "events": (("replica", "time", "process"), "number of collisions so far, by outcome"),
+    "attempts": (("replica", "process"), "number of candidates for these, accepted or not"),
     "extinction_time": (("replica",), "time at which all particles had become one cluster"),
 }
 
@@ -210,6 +211,7 @@ def to_dataset(model: Model, records: Records) -> xr.Dataset:
     values = {
         name: (dims, np.asarray(getattr(records, name), float))
         for name, (dims, _) in VARIABLES.items()
+        if getattr(records, name) is not None
     }
     if records.balance is not None:
         mass = (np.asarray(column, float) for column in records.balance)

@@ -1,19 +1,27 @@
-"""Bounds of the breakage of a size: above every split, and not far above."""
+"""Bins and bounds of the splits of a size."""
 
 from __future__ import annotations
 
 import math
 
+import numba
 import numpy as np
 import pytest
 
 import smolux as sx
 from smolux.callables import Function
+from smolux.core import splits
 from smolux.core.slots import slot_edges
+from smolux.core.state import LONE_BITS
 from smolux.processes import Fragmentation
 
-EDGES = slot_edges(3).astype(float)
-LOW, HIGH = EDGES[1:-1], EDGES[2:] - 1.0
+EDGES = slot_edges(LONE_BITS).astype(float)
+
+
+@numba.njit
+def _stretches(k):
+    """First split and number of splits of each bin."""
+    return [splits.stretch(k, b) for b in range(splits.bins_of(k))]
 
 
 def halves(i, j):
@@ -24,25 +32,43 @@ def monomers(i, j):
     return 1.0 if min(i, j) == 1 else 0.0
 
 
+@pytest.mark.parametrize("sizes", [range(2, 600), (4095, 4096, 4097, 16384, 16385, 123457)])
+def test_every_split_is_in_one_bin(sizes: object) -> None:
+    for k in sizes:
+        found = np.concatenate([first + np.arange(count) for first, count in _stretches(k)])
+        np.testing.assert_array_equal(np.sort(found), np.arange(1, k // 2 + 1))
+
+
 @pytest.mark.parametrize(
     "law", [1.5, "2/(i+j-1)", "1/(i*j)", "i*j", sx.kernels.Shear(1.0), halves, monomers]
 )
-def test_ceiling_holds_along_the_diagonal(law: object) -> None:
+def test_bounds_hold_in_the_bins(law: object) -> None:
     process = Fragmentation(law)
-    ceiling = process.ceiling(LOW, HIGH)
-    assert np.isfinite(ceiling).all()
-    for s in range(1, 45):  # every size and split up to 160 or so
-        k, i = np.meshgrid(np.arange(LOW[s], HIGH[s] + 1), np.arange(1.0, HIGH[s]), indexing="ij")
-        split = i < k
-        largest = (0.5 * (k - 1) * process.pairs(i, np.where(split, k - i, 1.0)))[split].max()
-        assert 0.55 * ceiling[s] <= largest <= ceiling[s]
+    slots = splits.slots_beside(20_000)
+    low, high = EDGES[slots], EDGES[1:][slots] - 1.0
+    bounds, widths, _ = process.split_bounds(low, high)
+    assert np.isfinite(bounds).all()
+    rng = np.random.default_rng(1)
+    for s in range(len(low)):
+        for k in (low[s], high[s], *rng.integers(low[s], high[s], 4)):
+            for b, (first, count) in enumerate(_stretches(int(k))):
+                assert count <= widths[s, b]
+                i = first + np.arange(count, dtype=float)
+                largest = process.pairs(i, k - i).max(initial=0.0)
+                assert largest <= bounds[s, b]
+                if isinstance(law, str) and count:  # and not far off, for smooth laws
+                    assert largest > 0.3 * bounds[s, b]
 
 
-def test_ceiling_of_a_law_that_falls_with_the_size() -> None:
-    """Uniform binary breakage has the rate 1 at every size; over the box it would be (k - 1)."""
-    ceiling = Fragmentation("2/(i+j-1)").ceiling(LOW, HIGH)[1:]
-    assert (ceiling >= 1.0).all()
-    assert (ceiling < 1.7).all()
+def test_narrow_laws_are_told_apart() -> None:
+    slots = splits.slots_beside(20_000)
+    low, high = EDGES[slots], EDGES[1:][slots] - 1.0
+    for law, narrow in ((halves, True), ("2/(i+j-1)", False), ("1/(i*j)", False)):
+        known = splits.new_splits()
+        splits.fill(known, slots, *Fragmentation(law).split_bounds(low, high))
+        assert known.narrow[:8].tolist() == [narrow] * 8
+        assert not known.narrow[8:].any()
+        assert (known.bounds[8:, 0] == -1.0).all()
 
 
 def test_what_is_too_large_is_infinite() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from smolux import kernels
 from smolux.assembly import windows_for
-from smolux.processes import Evaporation, Removal
+from smolux.processes import Removal
 from smolux.sizefunction import SizeFunction
 from smolux.timefunction import TimeFunction
 
@@ -76,13 +76,6 @@ def test_functions_of_size(function: object, low: float, high: float) -> None:
     assert bounds[0].tolist() == [0.0, 0.0]
     assert bounds[1][0] == 0
     assert bounds[1][1] >= 5
-
-
-@pytest.mark.parametrize("process", [Removal, Evaporation])
-def test_ceilings(process: type) -> None:
-    ceiling = process(one_size).ceiling(np.array([896.0, 1024.0]), np.array([1023.0, 1151.0]))
-    assert ceiling[0] == 0
-    assert ceiling[1] >= 5
 
 
 def test_lists_are_bounded_exactly() -> None:

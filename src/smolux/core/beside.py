@@ -202,19 +202,23 @@ def make_fire(
 
     @cold_piece
     def result(s, w, windows, r, p, q):
-        """Write what appears; how many entries, what vanishes, mass that comes in and goes out."""
+        """Write what appears; how many entries, and the sizes of what is there and may vanish.
+
+        Then what of both does (bits 1 and 2), and the mass that comes in and goes out.
+        """
         if s.count[KIND] == PAIR:
             i, j = pair(s, w)
             entries, gone = pair_outcome(r, i, j, s, p, q)
-            return entries, gone, 0.0, 0.0
+            return entries, i, j, gone, 0.0, 0.0
         if s.count[KIND] == ALONE:
             size = s.count[LONE_SIZE]
             entries, removes = lone_outcome(r - pairs, size, s.count[LONE_PART], s)
             entries = rounded(s, entries, size, p)
-            return entries, 1, 0.0, float(size) * stands(size, p) if removes else 0.0
+            left = float(size) * stands(size, p) if removes else 0.0
+            return entries, size, np.int64(0), 1, 0.0, left
         size = pick(s, windows, r)
         s.sizes[0], s.counts[0] = size, 1
-        return 1, 0, float(size) * stands(size, p), 0.0
+        return 1, np.int64(0), np.int64(0), 0, float(size) * stands(size, p), 0.0
 
     @cold_piece
     def wanting(s, entries, q):
@@ -236,18 +240,10 @@ def make_fire(
             enter(s, s.sizes[e], s.counts[e], q)
 
     @piece
-    def vanishing(s, w):
-        """Sizes of what may vanish."""
-        if s.count[KIND] == PAIR:
-            return pair(s, w)
-        return s.count[LONE_SIZE], np.int64(0)
-
-    @piece
     def exchange(s, w, windows, r, p, q):
         """Carry out process `r`: 0, or the reason to return, with nothing changed."""
         a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
-        i, j = vanishing(s, w)
-        entries, gone, come, left = result(s, w, windows, r, p, q)
+        entries, i, j, gone, come, left = result(s, w, windows, r, p, q)
         highest = np.int64(0)
         for e in range(entries):
             highest = max(highest, s.sizes[e])

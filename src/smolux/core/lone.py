@@ -33,12 +33,16 @@ from .state import (
     PARTICLES,
     SPLITS,
     TRIALS,
+    VAIN,
     VALUE,
     WANTED,
     WINDOW,
     WORST_I,
     WORST_J,
 )
+
+#: candidates in vain, for each particle, after which all are counted afresh
+_ENOUGH = 4
 
 
 class Lone(NamedTuple):
@@ -241,7 +245,7 @@ def make_ledger(rates: Rates, visit: Callable[[Any], Any], count: int) -> Ledger
         s.held[:] = 0
         s.most[:, :] = 0.0
         s.sums[:, :] = 0.0
-        s.count[WANTED] = 0
+        s.count[WANTED] = s.count[VAIN] = 0
         count_all(s, w, s, q, p)
         if s.count[WANTED] > 0:
             return SPLITS
@@ -322,6 +326,9 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
                 s.count[LONE], s.count[LONE_SIZE] = one, size
                 s.count[LONE_PROCESS], s.count[LONE_PART] = r, piece_of_it
                 break
+            s.count[VAIN] += 1
+        if s.count[VAIN] > _ENOUGH * s.count[PARTICLES] + PATIENCE:
+            s.held[0] = 0  # what had the largest rates may be gone
         return wait / rate
 
     return draw_lone

@@ -21,12 +21,13 @@ from . import rng
 from .compile import cold_piece, piece, user_piece
 from .loop import ROUNDING, note_bad
 from .slots import octave, slot_of, slot_top
-from .state import LONE_BITS, LONE_SLOTS, RAISED, REPAIRS, TRIALS, WORST_I, WORST_J
+from .state import LONE_BITS, LONE_SLOTS, RAISED, TRIALS
 
 #: largest size of which all splits are gone through in any case, and in slots of narrow laws
 EXACT, _LARGEST = 1 << 14, 1 << 26
-#: how many of these are remembered
-_KEPT = 1 << 10
+#: how many of these are remembered, as a power of two, and what spreads them over their rows
+_KEPT_BITS = 10
+_SPREAD = np.uint64(0x9E3779B97F4A7C15)
 #: bins of any size, at most
 _BINS = 2 * 62
 #: the slot of `EXACT`
@@ -62,7 +63,7 @@ class Splits(NamedTuple):
 
 def new_splits() -> Splits:
     """Return tables of which nothing is known; memory is taken as they are filled."""
-    rows, slots = EXACT + 1 + _KEPT, LONE_SLOTS - _FIRST
+    rows, slots = EXACT + 1 + (1 << _KEPT_BITS), LONE_SLOTS - _FIRST
     bounds = np.zeros((slots, _BINS))
     bounds[:, 0] = -1.0
     size, total = np.zeros(rows, np.int64), np.zeros(rows)
@@ -159,7 +160,8 @@ def bind_splits(rate: Callable[..., Any]) -> tuple[Any, Any, Any]:
         if k > EXACT:
             if k > _LARGEST or not q[1].narrow[slot_of(k, np.int64(LONE_BITS)) - _FIRST]:
                 return np.int64(-1)
-            row = EXACT + 1 + (k & (_KEPT - 1))
+            # by the leading bits of a product: halves of a size must not share a row
+            row = EXACT + 1 + np.int64((np.uint64(k) * _SPREAD) >> np.uint64(64 - _KEPT_BITS))
         if q[1].size[row] != k:
             learn(k, row, q)
         return row
@@ -210,8 +212,6 @@ def bind_splits(rate: Callable[..., Any]) -> tuple[Any, Any, Any]:
                 note_bad(s, i, size - i, value)
                 return np.int64(-1)
             if value > limit * raised * ROUNDING and row < 0:  # bounds found by trial only
-                s.count[REPAIRS] += 1
-                s.count[WORST_I], s.count[WORST_J] = i, size - i
                 s.clock[RAISED] = max(s.clock[RAISED], 1.1 * value / limit - 1.0)
                 s.held[0] = 0  # the rates of all sizes above are to be summed afresh
             if rng.uniform(s.rng) * limit * raised < value:

@@ -34,7 +34,8 @@ LONE_PROCESS = 23
 LONE_PART = 24
 CULPRIT = 25  # whose rate is no rate: 0 the kernel, r + 1 process r of single particles
 WANTED = 26  # the size of which the splits are to be bounded
-COUNTS = 27
+VAIN = 27  # candidates of single particles in vain since all were counted
+COUNTS = 28
 
 # Entries of State.clock.
 TIME = 0  # of the latest event
