@@ -21,6 +21,7 @@ _LAZY = {
     "ensemble": "smolux.ensembles",
     "efficiency": "smolux.ensembles",
     "summary": "smolux.analysis",
+    "law": "smolux.laws",
     "InputError": "smolux.errors",
     "WorkerError": "smolux.errors",
     "Interrupted": "smolux.errors",
@@ -64,6 +65,7 @@ __all__ = [
     "exact",
     "initial",
     "kernels",
+    "law",
     "methods",
     "plot",
     "plotting",
@@ -101,6 +103,7 @@ if TYPE_CHECKING:
     from .ensembles.efficiency import efficiency
     from .ensembles.ensemble import ensemble
     from .errors import InputError, Interrupted, SmoluxWarning, WorkerError
+    from .laws import law
     from .model import Model
     from .stochastic import resume, simulate
     from .sweeps import sweep

@@ -5,11 +5,11 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from .callables import golden
 from .content import digest, frozen, is_frozen
 from .core import beside, rng
 from .core.burst import make_burst
@@ -301,21 +301,40 @@ def bound_splits(processes: Sequence[Process], parameters: Parameters, size: int
             fill(own[1], slots, *process.split_bounds(low, high))
 
 
-def _edges(end: float) -> list[float]:
-    octaves = range(_FIRST_OCTAVE, int(np.ceil(np.log2(max(end, 2.0**_FIRST_OCTAVE)))) + 1)
-    edges = [0.0] + [2.0**k * (1 + m / _PIECES) for k in octaves for m in range(_PIECES)]
-    return [e for e in edges if e < end] + [next(e for e in edges if e >= end)]
+def _edges(end: float, factors: Sequence[TimeFunction]) -> tuple[float, ...]:
+    """Edges of the windows up to the end and of one more: pieces of octaves, and breakpoints."""
+    octaves = range(_FIRST_OCTAVE, int(np.ceil(np.log2(max(end, 2.0**_FIRST_OCTAVE)))) + 2)
+    edges = np.array([0.0] + [2.0**k * (1 + m / _PIECES) for k in octaves for m in range(_PIECES)])
+    last = int(np.searchsorted(edges, end))
+    named = np.concatenate([factor.edges for factor in factors])
+    inside = named[(named > 0.0) & (named < edges[last + 1])]
+    found = np.unique(np.concatenate([edges[: last + 2], inside]))
+    return tuple(found[: np.searchsorted(found, edges[last]) + 2].tolist())
 
 
 @lru_cache(maxsize=32)
-def _bounds(factor: TimeFunction, end: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    edges = _edges(end)
-    upper = np.array([factor.bounds(a, b)[1] for a, b in pairwise(edges)])
-    if not factor.rigorous:
-        # A bound of zero would never be repaired, as nothing would be tried: zeros prove nothing.
-        beside = np.maximum(np.append(upper[1:], 0.0), np.append(0.0, upper[:-1]))
-        upper = np.maximum(upper, _NEIGHBOUR * beside)
-    return tuple(edges), tuple(upper.tolist())
+def _bounds(factor: TimeFunction, edges: tuple[float, ...]) -> tuple[float, ...]:
+    """Bound a factor in all windows but the last one."""
+    start, end = np.array(edges[:-2]), np.array(edges[1:-1])
+    upper = factor.bounds(start, end)[1]
+    if factor.stated is None and not factor.followed:
+        # A bound of zero would never be repaired, as nothing would be tried: zeros prove nothing,
+        # unless the factor is known to jump between.
+        after = np.append(upper[1:], _glimpse(factor, edges[-2], edges[-1]))
+        before = np.append(0.0, upper[:-1])
+        after[np.isin(end, factor.breakpoints)] = 0.0
+        before[np.isin(start, factor.breakpoints)] = 0.0
+        upper = np.maximum(upper, _NEIGHBOUR * np.maximum(before, after))
+    return tuple(upper.tolist())
+
+
+def _glimpse(factor: TimeFunction, start: float, end: float) -> float:
+    """Bound beyond the last window, which must not differ from that of a longer run; 0 if none."""
+    try:
+        bound = float(factor.bounds(start, end)[1])
+    except Exception:  # what a function does there is not held against it
+        return 0.0
+    return bound if np.isfinite(bound) else 0.0
 
 
 def windows_for(
@@ -324,7 +343,8 @@ def windows_for(
     """Bound the rate factors over windows of time that depend on the factors alone.
 
     A factor that does not vary needs one window without end. Others have four windows an octave of
-    time, whatever the output times are, so that a trajectory does not depend on these.
+    time, and more where one of them may jump, whatever the output times are, so that a trajectory
+    does not depend on these.
 
     Raises
     ------
@@ -336,8 +356,9 @@ def windows_for(
         edges = [0.0, np.inf]
         bounds = [[float(f.constant) for f in factors if f.constant is not None]]
     else:
-        edges = [*_edges(end), np.inf]
-        columns = [[*_bounds(f, end)[1], 0.0] for f in factors]
+        windows = _edges(end, factors)
+        edges = [*windows[:-1], np.inf]
+        columns = [[*_bounds(f, windows), 0.0] for f in factors]
         bounds = [list(row) for row in zip(*columns, strict=True)]
         _check_factors(processes, edges, np.array(bounds), end)
     array = np.array(bounds, float)
@@ -360,8 +381,7 @@ def inflow(processes: Sequence[Process], weighting: Weighting, end: float) -> fl
     InputError
         If nothing is seen to come in until then.
     """
-    # spread by the golden ratio: in step with no period
-    times = end * np.modf(np.arange(1, _INFLOW_SAMPLES + 1) * 0.6180339887498949)[0]
+    times = end * golden(_INFLOW_SAMPLES)  # in step with no period
     total = 0.0
     for source in (p for p in processes if isinstance(p, Source)):
         sizes, rates = source.table

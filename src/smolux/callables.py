@@ -9,14 +9,14 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache, reduce
-from types import BuiltinFunctionType, FunctionType, SimpleNamespace
+from types import BuiltinFunctionType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .checks import is_number
-from .content import frozen
+from .content import INSTALLED, frozen, module_of, names_in
 from .errors import InputError, did_you_mean
 from .intervals import Interval
 
@@ -153,9 +153,8 @@ class Function:
             result = np.array(np.broadcast_to(found, (size,)), float)
         except Exception:  # whatever it is: the function is not one of arrays
             return None
-        # Spread by the golden ratio: never in step with the rows of a matrix.
-        spread = np.modf(np.arange(1, _COMPARED) * 0.6180339887498949)[0] * size
-        index = np.concatenate([spread.astype(int), [0, size - 1]])
+        # never in step with the rows of a matrix
+        index = np.concatenate([(golden(_COMPARED - 1) * size).astype(int), [0, size - 1]])
         single = [_scalar(now, tuple(x[k] for x in flat), parameters) for k in index]
         same = np.allclose(result[index], single, rtol=1e-9, atol=0.0, equal_nan=True)
         return result if same else None
@@ -192,8 +191,8 @@ def _scalar(
 def numbers_of(function: Callable[..., Any], most: int = 4096) -> Float:
     """Return the numbers that a function reads, ascending: where its branches and tables change.
 
-    Constants, defaults, and what is in its closure and its globals, and in the functions that it
-    calls by a global name; arrays and lists of numbers, too, unless there are more than `most`.
+    Constants, defaults, and what is in its closure, its globals and modules of the user, and in the
+    functions that it calls; arrays and lists of numbers, too, unless there are more than `most`.
     """
     found: set[float] = set()
     _collect(function, found, set(), most)
@@ -208,7 +207,12 @@ def _collect(value: Any, found: set[float], done: set[int], most: int) -> None:
         done.add(id(called))
         reached = inspect.getclosurevars(called)
         held = [*called.__code__.co_consts, *(called.__defaults__ or ())]
-        for inner in (*held, *reached.nonlocals.values(), *reached.globals.values()):
+        held += [*reached.nonlocals.values(), *reached.globals.values()]
+        for module in [value for value in held if isinstance(value, ModuleType)]:
+            if module_of(module) not in INSTALLED:
+                names = names_in(called.__code__)
+                held += [getattr(module, name) for name in names if hasattr(module, name)]
+        for inner in held:
             _collect(inner, found, done, most)
     elif is_number(value):
         found |= {abs(float(value))} if np.isfinite(value) else set()
@@ -218,14 +222,18 @@ def _collect(value: Any, found: set[float], done: set[int], most: int) -> None:
             found |= set(entries[np.isfinite(entries)].tolist())
 
 
+def golden(count: int) -> Float:
+    """Return numbers in [0, 1), spread by the golden ratio: evenly, and in step with no period."""
+    return np.modf(np.arange(1, count + 1) * 0.6180339887498949)[0]
+
+
 def spread(count: int) -> Float:
     """Return numbers in [0, 1] in no step with any period: both ends, even and irregular ones.
 
     The same ones on every machine: PCG64 is defined to the bit.
     """
-    golden = np.modf(np.arange(1, count) * 0.6180339887498949)[0]
     random = np.random.Generator(np.random.PCG64(count)).random(count)
-    return np.concatenate([np.linspace(0.0, 1.0, count // 4 + 1), golden, random])
+    return np.concatenate([np.linspace(0.0, 1.0, count // 4 + 1), golden(count - 1), random])
 
 
 def wrong_number(value: Any, where: str) -> list[str]:
@@ -278,4 +286,10 @@ def _pairwise(ufunc: Any) -> Callable[..., Any]:
     return chosen
 
 
-_BUILTINS = {"min": _pairwise(np.minimum), "max": _pairwise(np.maximum)}
+def _as_numbers(x: Any = 0.0) -> Any:
+    if isinstance(x, Interval):
+        return x
+    return np.asarray(x, float) if np.ndim(x) else float(x)
+
+
+_BUILTINS = {"min": _pairwise(np.minimum), "max": _pairwise(np.maximum), "float": _as_numbers}

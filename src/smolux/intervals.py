@@ -145,6 +145,9 @@ class Interval:
             return NotImplemented
         return UFUNCS[ufunc](*inputs)
 
+    def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        return interpolated(*args, **kwargs) if function is np.interp else NotImplemented
+
 
 def _as_interval(value: Any) -> Interval | None:
     if isinstance(value, Interval):
@@ -257,6 +260,41 @@ def _operands(x: Any, y: Any) -> tuple[Interval, Interval]:
     if first is None or second is None:
         raise TypeError(f"no interval can be made of {y if second is None else x!r}")
     return first, second
+
+
+def range_of(
+    values: Float, first: NDArray[np.int64], last: NDArray[np.int64]
+) -> tuple[Float, Float]:
+    """Least and largest of ``values[first:last]`` for many ranges; of an empty one, some value."""
+    if not first.size:
+        return np.empty(first.shape), np.empty(first.shape)
+    padded = np.append(values, values[-1])  # so that the end of a range is a place, too
+    places = np.stack([first.ravel(), last.ravel()], axis=1).ravel()
+    least = np.minimum.reduceat(padded, places)[::2]
+    most = np.maximum.reduceat(padded, places)[::2]
+    return least.reshape(first.shape), most.reshape(first.shape)
+
+
+def interpolated(
+    x: Any, xp: ArrayLike, fp: ArrayLike, left: Any = None, right: Any = None
+) -> Interval:
+    """Range of ``np.interp``: the values at both ends and at the points of the table between."""
+    if not isinstance(x, Interval):
+        raise TypeError("not followed: a table of intervals")
+    points, values = np.asarray(xp, float), np.asarray(fp, float)
+    with np.errstate(all="ignore"):
+        ends = [np.interp(end, points, values, left, right) for end in (x.lo, x.hi)]
+    first = np.asarray(np.searchsorted(points, x.lo))
+    last = np.asarray(np.searchsorted(points, x.hi, side="right"))
+    least, most = range_of(values, first, last)
+    low, high = np.minimum(*ends), np.maximum(*ends)
+    low = np.where(last > first, np.minimum(low, least), low)
+    high = np.where(last > first, np.maximum(high, most), high)
+    # compiled code rounds the slopes in its own way
+    scale = np.max(np.abs(values), initial=0.0) * _ELEMENTARY
+    wide = _known(low - scale, high + scale)
+    positive = min(np.min(values), 0.0 if left is None else left, 0.0 if right is None else right)
+    return Interval(np.maximum(wide.lo, 0.0) if positive >= 0.0 else wide.lo, wide.hi)
 
 
 #: the NumPy functions that intervals follow

@@ -13,11 +13,10 @@ from .callables import Function
 from .errors import InputError, did_you_mean
 from .initial import INITIALS, Initial, Sizes, from_sizes, monodisperse
 from .kernels.base import Kernel
+from .laws import Law, Stated
 from .model import Model
 from .processes import PROCESSES
 from .processes.base import Process
-from .sizefunction import SizeFunction
-from .timefunction import TimeFunction
 
 T = TypeVar("T")
 
@@ -42,10 +41,13 @@ def _plain(value: Any) -> Any:
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, (Sequence, np.ndarray)):
         return [_plain(v) for v in value]
-    if isinstance(value, (TimeFunction, SizeFunction)):
+    if isinstance(value, Law):
         if value.user is not None:
             return _function(value.user)
         return value.text if value.constant is None else value.constant
+    if isinstance(value, Stated):
+        known = {"bounds": value.bounds, "breakpoints": value.breakpoints}
+        return {**_plain(value.function), **_plain(known)}
     return _function(Function(getattr(value, "py_func", value), (), ()))
 
 

@@ -9,8 +9,12 @@ from numpy.typing import NDArray
 
 from .core.splits import EXACT
 from .core.state import (
+    BY_FACTOR,
+    BY_KERNEL,
+    BY_SPLITS,
     CLOCKS,
     DOUBLINGS,
+    EVENTS,
     EXTINCT,
     FLOOR,
     RAISED,
@@ -181,35 +185,55 @@ def _attributes(plan: Plan, groups: Sequence[Group | Divided]) -> dict[str, obje
     }
 
 
-def _warnings(plan: Plan, groups: Sequence[Group | Divided], unfinished: int) -> list[str]:
+def _lacking(missed: float, events: int) -> str:
+    """Say how many events did not take place, by the estimate of `smolux.core.loop.repair`."""
+    share = missed / max(events + missed, 1.0)
+    return f"an estimated {missed:.3g} of its events, {share:.2g} of all, did not take place"
+
+
+def _broken_bounds(plan: Plan, groups: Sequence[Group | Divided]) -> list[str]:
+    """Say which bounds did not hold, and how many events did not take place before a repair."""
     count = np.concatenate([g.state.count for g in groups])
     clock = np.concatenate([g.state.clock for g in groups])
+    missed = np.concatenate([g.state.missed for g in groups]).sum(axis=0)
+    events = np.concatenate([g.state.events for g in groups]).sum(axis=0)
     found = []
-    if count[:, REPAIRS].any():
+    repairs = int(count[:, REPAIRS].sum())
+    if repairs:
         i, j = count[clock[:, FLOOR].argmax(), [WORST_I, WORST_J]]
+        lacking = _lacking(missed[BY_KERNEL], int(count[:, EVENTS].sum()))
         found.append(
-            f"the kernel was found above its bound {count[:, REPAIRS].sum()} times in "
-            f"{count[:, TRIALS].sum()} candidates, for example at the sizes {i} and {j}; the bound "
-            "was raised from there on. A kernel written as a formula, or bounds= of from_function "
-            "that hold, have no such error"
+            f"the kernel was found above its bound {repairs} times in {count[:, TRIALS].sum()} "
+            f"candidates, for example at the sizes {i} and {j}: {lacking}, give or take "
+            f"{1.0 / np.sqrt(repairs):.0%} of that, before the bound was raised, besides what no "
+            "candidate has met. A kernel written as a formula, or bounds= of from_function that "
+            "hold, have no such error"
         )
-    if clock[:, RAISED].any():
-        broken = " and ".join(
-            p.name for p in plan.model.processes if isinstance(p, LoneProcess) and p.splits
-        )
+    splits = [isinstance(p, LoneProcess) and p.splits for p in plan.model.processes]
+    cure = "A formula in i and j has proved bounds; of a function, from_function takes them"
+    name = f"fragmentation, for a size above {EXACT},"
+    _add(found, name, clock[:, RAISED], missed[BY_SPLITS], events[splits].sum(), cure)
+    cure = "A formula in t has proved bounds; of a function, smolux.law states them"
+    for k, process in enumerate(plan.model.processes):
+        name = f"{process.name}, {process.factor.text},"
+        _add(found, name, clock[:, CLOCKS + k], missed[BY_FACTOR + k], events[k], cure)
+    return found
+
+
+def _add(found: list[str], name: str, raised: Float, missed: float, events: int, cure: str) -> None:
+    """Add a warning if the bound of a rate was `raised` in one of the replicas."""
+    replicas = int((raised > 0.0).sum())
+    if replicas:
         found.append(
-            f"the rate of {broken} was found {(1.0 + clock[:, RAISED].max()) / 1.1:.3g} times as "
-            f"high as its sampled bound, for a size above {EXACT}; the bound was raised from there "
-            "on: a formula in i and j has proved bounds"
+            f"the rate of {name} was found above its sampled bound in {replicas} of {len(raised)} "
+            f"replicas: {_lacking(missed, int(events))} before the bound was raised, besides what "
+            f"no candidate has met. {cure}"
         )
-    raised = clock[:, CLOCKS:] > 0
-    for process, replicas in zip(plan.model.processes, raised.sum(axis=0), strict=True):
-        if replicas:
-            found.append(
-                f"the rate of {process.name}, {process.factor.text}, was found above its sampled "
-                f"bound in {replicas} of {len(raised)} replicas; the bound was raised from there "
-                "on: a formula in t has proved bounds"
-            )
+
+
+def _warnings(plan: Plan, groups: Sequence[Group | Divided], unfinished: int) -> list[str]:
+    clock = np.concatenate([g.state.clock for g in groups])
+    found = _broken_bounds(plan, groups)
     found += _rarely_accepted(plan, groups)
     extinct = clock[:, EXTINCT]
     ended = int(np.isfinite(extinct).sum())

@@ -25,6 +25,7 @@ from .core.state import (
     BAD_RATE,
     BOUND,
     BUDGET,
+    BY_FACTOR,
     CLOCKS,
     CULPRIT,
     DONE,
@@ -252,8 +253,11 @@ class Group:
                 f"t = {self.state.clock[r, PENDING]:.6g}; it must be a finite number, zero or more"
             )
         # for this replica alone: what others do must not depend on when this one came here
-        clock = self.state.clock[r]
-        clock[CLOCKS + process] = 1.1 * value - self.windows.bounds[window, process]
+        clock, known = self.state.clock[r], float(self.windows.bounds[window, process])
+        bound = known + clock[CLOCKS + process]
+        if bound > 0.0:  # see `smolux.core.loop.repair`
+            self.state.missed[r, BY_FACTOR + process] += value / bound - 1.0
+        clock[CLOCKS + process] = 1.1 * value - known
         clock[EXCESS] = clock[CLOCKS:].sum()
 
 

@@ -216,6 +216,7 @@ class Divided:
             np.maximum(clock[RAISED:], part.state.clock[0, RAISED:], out=clock[RAISED:])
             self.state.events[0] += part.state.events[0]
             self.state.attempts[0] += part.state.attempts[0]
+            self.state.missed[0] += part.state.missed[0]
             clock[[MASS_IN, MASS_OUT]] += part.state.clock[0, [MASS_IN, MASS_OUT]]
             self.seconds += part.seconds
         clock[EXCESS] = clock[CLOCKS:].sum()

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .boxes import subdivided
-from .callables import Function, numbers_of, spread
-from .checks import is_number
+from .callables import numbers_of, spread
 from .errors import InputError
-from .formula import Formula, parse
-from .intervals import Interval
+from .laws import Law, Stated
 
 Float = NDArray[np.float64]
 
@@ -23,34 +20,14 @@ _SAMPLES = 128
 _MARGIN = 0.1
 #: a lower bound that is negative by no more than this share of the upper one is rounding
 _ROUNDING = 1e-12
-
-
-def _number(t: Any, value: Any) -> Any:
-    return value
+#: a function that reads more numbers than this holds tables rather than times
+_TIMES = 64
+_KINDS = 'a number, a function f(t) or a formula in t such as "0.01 * (1 - t/400)"'
 
 
 @dataclass(frozen=True)
-class TimeFunction:
-    """A rate that may depend on time; made by `TimeFunction.of`.
-
-    Attributes
-    ----------
-    text : str
-        For case files and messages: the number, the formula, or the name of the function.
-    parameters : tuple of float
-        What `rate` takes after the time.
-    constant : float or None
-        The value, if it does not depend on time.
-    formula : Formula or None
-    user : smolux.callables.Function or None
-        At most one of the three is given.
-    """
-
-    text: str
-    parameters: tuple[float, ...] = ()
-    constant: float | None = None
-    formula: Formula | None = None
-    user: Function | None = None
+class TimeFunction(Law):
+    """A rate that may depend on time; made by `TimeFunction.of`."""
 
     @classmethod
     def of(cls, value: Any, what: str = "the function of time") -> TimeFunction:
@@ -58,9 +35,10 @@ class TimeFunction:
 
         Parameters
         ----------
-        value : float, callable, str or TimeFunction
+        value : float, callable, str, Stated or TimeFunction
             A number; a plain Python function ``f(t)``, whose further arguments have defaults; or a
-            formula in ``t`` such as ``"0.01 * (1 - t/400)"``, see `smolux.formula`.
+            formula in ``t`` such as ``"0.01 * (1 - t/400)"``, see `smolux.formula`; or a function
+            with what is known of it, see `smolux.law`.
         what : str
             What it stands for, for messages.
 
@@ -71,23 +49,11 @@ class TimeFunction:
         """
         if isinstance(value, cls):
             return value
-        if isinstance(value, str):
-            expression = parse(value, ("t",), what)
-            if expression.names:
-                new = cls(value, formula=expression)
-            else:
-                number = float(expression.evaluate())
-                new = cls(value, (number,), number)
-        elif is_number(value):
-            new = cls(repr(float(value)), (float(value),), float(value))
-        elif callable(value):
-            user = Function.of(value, ("t",), what)
-            new = cls(user.text, user.defaults, user=user)
+        if isinstance(value, Stated):
+            read = cls.read(value.function, ("t",), what, _KINDS)
+            new = replace(read, stated=value.bounds, breakpoints=value.breakpoints)
         else:
-            raise InputError(
-                f"{what} = {value!r}: must be a number, a function f(t) or a formula in t "
-                'such as "0.01 * (1 - t/400)"'
-            )
+            new = cls.read(value, ("t",), what, _KINDS)
         new._check_start(what)
         return new
 
@@ -103,69 +69,77 @@ class TimeFunction:
             when = "" if self.constant is not None else " at t = 0"
             raise InputError(f"{where}: is {start:g}{when}; must be a finite number, zero or more")
 
-    @property
-    def rate(self) -> Callable[..., Any]:
-        """``rate(t, *parameters) -> float``: plain Python that Numba compiles.
-
-        The same object for equal functions.
-        """
-        if self.formula is not None:
-            return self.formula.function(("t",))
-        return _number if self.user is None else self.user.function
-
-    @property
-    def rigorous(self) -> bool:
-        """Whether `bounds` is proved: for numbers and formulas."""
-        return self.user is None
-
     def __call__(self, t: ArrayLike) -> Any:
         """Evaluate at one time (a float) or at an array of times (an array)."""
-        if self.user is not None:
-            values = self.user.evaluate((t,), self.parameters)
-        elif self.formula is not None:
-            values = self.formula.evaluate(t=t)
-        else:
-            values = np.full(np.shape(t), self.constant)
+        values = self.on(t)
         return values if np.ndim(t) else float(values)
 
-    def bounds(self, t0: float, t1: float) -> tuple[float, float]:
-        """Bounds over the times ``t0 <= t <= t1``.
+    @property
+    def edges(self) -> Float:
+        """Times between which it is bounded by itself.
+
+        Those that the user states, and those that a function names which is known by trial alone.
+        """
+        read = np.empty(0)
+        if self.user is not None and self.stated is None and not self.followed:
+            read = numbers_of(self.user.function)
+            read = read if len(read) <= _TIMES else np.empty(0)
+        return np.unique(np.concatenate([self.breakpoints, read]))
+
+    def bounds(self, t0: ArrayLike, t1: ArrayLike) -> tuple[Any, Any]:
+        """Bounds over the times ``t0 <= t <= t1``, numbers or arrays.
 
         By interval arithmetic for formulas, and for Python functions that it can follow; other
-        functions are sampled, and a margin is added.
+        functions are tried at many times, and a margin is added.
 
         Returns
         -------
-        lower, upper : float
+        lower, upper : float or ndarray
             Infinite if the function is not bounded. A function that turns negative has a negative
             lower bound.
         """
+        sides = np.broadcast_arrays(np.asarray(t0, float), np.asarray(t1, float))
+        if self.stated is not None:
+            lower, upper = self.stated_bounds(*sides)
+        else:
+            lower, upper = self._proved(*sides) if self.followed else self._sampled(*sides)
+        return (lower, upper) if np.ndim(lower) else (float(lower), float(upper))
+
+    def _proved(self, t0: Float, t1: Float) -> tuple[Float, Float]:
         if self.constant is not None:
-            return self.constant, self.constant
-        try:
-            found = subdivided(self._interval, t0, t1, 0.0, 0.0, 8, geometric=False, tolerance=0.01)
-        except TypeError:
-            return self._sampled(t0, t1)
-        low, high = float(found[0]), float(found[1])
-        return (0.0 if -_ROUNDING * high <= low < 0 else low), high
+            return np.full(t0.shape, self.constant), np.full(t0.shape, self.constant)
+        zero = np.zeros(t0.shape)
+        low, high = subdivided(
+            lambda t, _: self.interval(t), t0, t1, zero, zero, 8, geometric=False, tolerance=0.01,
+        )  # fmt: skip
+        return np.where((-_ROUNDING * high <= low) & (low < 0), 0.0, low), high
 
-    def _interval(self, t: Interval, _: Interval) -> Interval:
-        if self.user is not None:
-            return self.user.interval((t,), self.parameters)
-        assert self.formula is not None
-        return self.formula.interval(t=t)
-
-    def _sampled(self, t0: float, t1: float) -> tuple[float, float]:
-        assert self.user is not None
-        shares = spread(_SAMPLES)
-        numbers = numbers_of(self.user.function)
-        inside = numbers[(numbers >= t0) & (numbers <= t1)]
-        # Both sides of what the function compares with, and what lies between two of these.
-        edges = np.concatenate([inside, np.nextafter(inside, t0), np.nextafter(inside, t1)])
-        ends = np.unique(np.concatenate([[t0], inside, [t1]]))
-        between = 0.5 * (ends[1:] + ends[:-1])
-        values = self(np.concatenate([t0 + (t1 - t0) * shares, edges, between]))
-        low, high = float(values.min()), float(values.max())
+    def _sampled(self, t0: Float, t1: Float) -> tuple[Float, Float]:
+        times, window = _times(t0.ravel(), t1.ravel(), self.numbers)
+        values = self(times)
+        least, most = np.full(t0.size, np.inf), np.full(t0.size, -np.inf)
+        np.minimum.at(least, window, values)
+        np.maximum.at(most, window, values)
+        low, high = least.reshape(t0.shape), most.reshape(t0.shape)
         margin = _MARGIN * (high - low)
         # A function that is not seen to be negative is not taken to be.
-        return (max(low - margin, 0.0) if low >= 0 else low - margin), high + margin
+        return np.where(low >= 0, np.maximum(low - margin, 0.0), low - margin), high + margin
+
+
+def _times(t0: Float, t1: Float, numbers: Float) -> tuple[Float, NDArray[np.int64]]:
+    """Return times at which a function is tried over ranges of time, and the range of each.
+
+    In no step with any period; both sides of what the function compares with, and what lies between
+    two of these.
+    """
+    shares = spread(_SAMPLES)
+    times = [(t0[:, None] + (t1 - t0)[:, None] * shares).ravel()]
+    owners = [np.repeat(np.arange(len(t0)), len(shares))]
+    for k, (low, high) in enumerate(zip(t0, t1, strict=True)):
+        inside = numbers[(numbers >= low) & (numbers <= high)]
+        ends = np.unique(np.concatenate([[low], inside, [high]]))
+        between = 0.5 * (ends[1:] + ends[:-1])
+        found = [inside, np.nextafter(inside, low), np.nextafter(inside, high), between]
+        times += found
+        owners.append(np.full(sum(map(len, found)), k))
+    return np.concatenate(times), np.concatenate(owners)

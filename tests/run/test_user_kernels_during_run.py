@@ -30,15 +30,21 @@ SETTINGS = {"inverse": sx.methods.Inverse(buckets=64)}
 SQUARE = 441.0
 
 
-def odd(i: float, j: float, square: float = SQUARE, value: float = 1.0) -> float:
-    """Constant, but for pairs with one size; `value` above 8 stands for what is no number."""
+def odd(
+    i: float, j: float, square: float = SQUARE, value: float = 1.0, total: float = 0.0,
+    rest: float = 1.0,
+) -> float:  # fmt: skip
+    """Constant, but for pairs with one size; `value` above 8 stands for what is no number.
+
+    Or constant for pairs of one `total`, and the `rest` for all others.
+    """
     if i * i == square or j * j == square:
         if value == 9.0:
             return math.nan
         if value == 10.0:
             return math.inf
         return value
-    return 1.0
+    return 1.0 if i + j == total else rest
 
 
 def spike(t: float, low: float = 0.0, high: float = 0.0) -> float:
@@ -178,6 +184,23 @@ def test_events_in_a_row_are_those_of_the_loop(
     assert (states[0].events > 100).all()
     for name, values in states[0]._asdict().items():
         np.testing.assert_array_equal(values, getattr(states[1], name), name)
+
+
+@pytest.mark.parametrize("sizes", [(500, 501), (37, 41)])
+@every_method
+def test_two_sizes_that_meet(method: str, sizes: tuple[int, int]) -> None:
+    """Nothing else does: the rate is one for one sum of sizes only, which the user states."""
+    total = float(sum(sizes))
+    kernel = sx.kernels.from_function(odd, square=0.0, total=total, rest=1e-9, breakpoints=[total])
+    physics = sx.Model(
+        kernel, model(1.0).processes, sx.initial.from_sizes(dict.fromkeys(sizes, 0.5))
+    )
+    ds = sx.simulate(
+        physics, [1.0], particles=1000, replicas=8, seed=1, method=SETTINGS.get(method, method)
+    )
+    # of both there are 1/2 / (1 + t/2), and one particle less for each that is gone
+    mean = float(ds["number_density"].mean())
+    assert abs(mean - 5 / 6) < 4.5 * 0.3 / np.sqrt(8 * 1000)
 
 
 # --- rates of processes --------------------------------------------------------------------------

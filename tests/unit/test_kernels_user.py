@@ -220,8 +220,8 @@ def test_sizes_beyond_the_common_are_checked_if_they_are_there() -> None:
         (lambda: from_function(scaled_sum, scael=1.0), ["did you mean 'scale'?"]),
         (lambda: from_function(larger, a=1.0), ["unknown parameter 'a' of larger; it takes none"]),
         (
-            lambda: from_function(larger, bounds=3, gels=2, degree="x"),
-            ["degree", "bounds = 3", "gels"],
+            lambda: from_function(larger, bounds=-3, gels=2, degree="x"),
+            ["degree", "bounds = -3", "gels"],
         ),
         (lambda: formula("(i/j)**b", a=1.0), ["unknown name 'b'"]),
         (lambda: formula("i*j", a=1.0), ["parameter 'a' does not occur"]),

@@ -51,7 +51,7 @@ def test_every_kind(value: Any) -> None:
     lower, upper = f.bounds(0, 20)
     assert lower <= values.min()
     assert values.max() <= upper
-    assert f.rigorous is not callable(value)
+    assert f.rigorous is (value is not step)  # intervals follow no branches
     assert f == of(value)
     assert hash(f) == hash(of(value))
     assert f.rate is of(value).rate

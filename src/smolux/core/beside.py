@@ -23,11 +23,14 @@ from .loop import make_choose_process, schedule, thinned
 from .state import (
     BAD_FACTOR,
     BAD_RATE,
+    BY_KERNEL,
+    BY_SPLITS,
     CLOCKS,
     DRAW,
     EVENTS,
     FIRST,
     GROW,
+    IN_DOUBT,
     KIND,
     LARGEST,
     LIMIT,
@@ -41,6 +44,7 @@ from .state import (
     PHASE,
     PROCESS,
     SINCE,
+    SPLIT_IN_DOUBT,
     SPLITS,
     TIME,
     TOO_LARGE,
@@ -78,6 +82,7 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
             reason = ready(s, w, p, q.lone)
             if reason != 0:
                 return reason
+        s.missed[IN_DOUBT] = s.missed[SPLIT_IN_DOUBT] = 0.0
         wait = math.inf
         if pairs > 0:
             total = windows.total[window]
@@ -289,6 +294,9 @@ def make_fire(
                     return reason
                 if kind == PAIR:
                     s.count[EVENTS] += 1
+                    s.missed[BY_KERNEL] += s.missed[IN_DOUBT]
+                elif kind == ALONE:
+                    s.missed[BY_SPLITS] += s.missed[SPLIT_IN_DOUBT]
         s.clock[TIME] = s.clock[PENDING]
         s.count[PHASE] = DRAW
         return 0

@@ -27,6 +27,7 @@ from .state import (
     BAD_FACTOR,
     BAD_RATE,
     BUDGET,
+    BY_KERNEL,
     CLOCKS,
     CULPRIT,
     DONE,
@@ -40,6 +41,7 @@ from .state import (
     FIRST,
     FLOOR,
     GROW,
+    IN_DOUBT,
     LARGEST,
     LIMIT,
     MASS_IN,
@@ -191,6 +193,7 @@ def make_next_event(
     def next_event(s, w, windows, p, q, until, stop):
         window = s.count[WINDOW]
         total = windows.total[window] + s.clock[EXCESS]
+        s.missed[IN_DOUBT] = 0.0
         wait = math.inf
         if total > 0.0:
             wait = draw(s, w, p, total)
@@ -254,6 +257,8 @@ def make_fire(
                 s.count[EVENTS] += 1
                 s.count[SINCE] += 1
                 s.events[r] += 1
+                s.missed[BY_KERNEL] += s.missed[IN_DOUBT]
+                s.missed[IN_DOUBT] = 0.0
                 if s.count[PARTICLES] == 1:
                     s.clock[EXTINCT] = s.clock[PENDING]
         s.clock[TIME] = s.clock[PENDING]
@@ -357,6 +362,7 @@ def make_loop(
                 state.held[r],
                 state.most[r],
                 state.sums[r],
+                state.missed[r],
             )
             t = Tally(
                 tally.scalars[r], tally.events[r], tally.counts[r], tally.bins[r], tally.sums[r]
@@ -369,8 +375,16 @@ def make_loop(
 
 
 @cold_piece
-def repair(s, i, j, value):
-    """Note a rate above its bound and raise the bound for the rest of the run."""
+def repair(s, i, j, value, bound):
+    """Note a rate above its bound and raise the bound for the rest of the run.
+
+    Until then pairs of a rate K above their bound B were candidates at the rate c B and all
+    accepted, so that collisions were missing at the rate c (K - B). Each such collision that takes
+    place adds ``K/B - 1`` to the estimate of those missed. Its expectation is right, whatever sizes
+    came and went and whenever the bound was raised: what is counted at the rate c B with these
+    marks grows on average by the integral of ``c B (K/B - 1)``, which is what was missing.
+    """
+    s.missed[IN_DOUBT] = value / bound - 1.0
     s.count[REPAIRS] += 1
     s.count[WORST_I], s.count[WORST_J] = i, j
     s.clock[FLOOR] = max(s.clock[FLOOR], 1.1 * value)

@@ -21,7 +21,7 @@ from . import rng
 from .compile import cold_piece, piece, user_piece
 from .loop import ROUNDING, note_bad
 from .slots import octave, slot_of, slot_top
-from .state import LONE_BITS, LONE_SLOTS, RAISED, TRIALS
+from .state import LONE_BITS, LONE_SLOTS, RAISED, SPLIT_IN_DOUBT, TRIALS
 
 #: largest size of which all splits are gone through in any case, and in slots of narrow laws
 EXACT, _LARGEST = 1 << 14, 1 << 26
@@ -212,6 +212,7 @@ def bind_splits(rate: Callable[..., Any]) -> tuple[Any, Any, Any]:
                 note_bad(s, i, size - i, value)
                 return np.int64(-1)
             if value > limit * raised * ROUNDING and row < 0:  # bounds found by trial only
+                s.missed[SPLIT_IN_DOUBT] = value / (limit * raised) - 1.0
                 s.clock[RAISED] = max(s.clock[RAISED], 1.1 * value / limit - 1.0)
                 s.held[0] = 0  # the rates of all sizes above are to be summed afresh
             if rng.uniform(s.rng) * limit * raised < value:

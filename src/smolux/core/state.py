@@ -51,6 +51,13 @@ MASS_OUT = 9
 RAISED = 10  # by which share bounds of splits were found too low
 CLOCKS = 11  # from here on, for each process: what repairs have added to the bounds of its factor
 
+# Entries of State.missed.
+IN_DOUBT = 0  # what the pending encounter adds to what follows, should it take place
+SPLIT_IN_DOUBT = 1  # the same of a single particle that splits
+BY_KERNEL = 2
+BY_SPLITS = 3
+BY_FACTOR = 4  # from here on, for each process: by the bounds of its factor
+
 #: sizes stay below this, so that a sum of two cannot overflow
 LIMIT = 1 << 62
 
@@ -93,6 +100,9 @@ class State(NamedTuple):
         Largest rate of a particle since its slot was last empty, for each process of these.
     sums : float64 array of shape (R, L, octaves)
         Sums of ``held * most`` over the slots of an octave.
+    missed : float64 array of shape (R, BY_FACTOR + P)
+        Estimate of the events that did not take place as a bound did not hold, see
+        `smolux.core.loop.repair`.
     """
 
     rng: np.ndarray
@@ -105,6 +115,7 @@ class State(NamedTuple):
     held: np.ndarray
     most: np.ndarray
     sums: np.ndarray
+    missed: np.ndarray
 
 
 class Windows(NamedTuple):
@@ -207,6 +218,7 @@ def new_state(rng: np.ndarray, processes: int, entries: int, lone: int) -> State
         np.zeros((replicas, slots), np.int64),
         np.zeros((replicas, lone, slots)),
         np.zeros((replicas, lone, slots >> LONE_BITS)),
+        np.zeros((replicas, BY_FACTOR + processes)),
     )
 
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from smolux.errors import InputError
+
 if TYPE_CHECKING:
     from .base import Kernel
 
@@ -107,6 +109,8 @@ def _declared(
     low, high = sizes[0], sizes[-1]
     try:
         lower, upper = (float(bound) for bound in kernel.bounds(low, high, low, high))
+    except InputError as error:
+        return [*problems, *(f"{where}: {problem}" for problem in error.problems)]
     except Exception as error:  # bounds of the user
         return [*problems, f"{where}: bounds raise {type(error).__name__}: {error}; correct them"]
     wrong = ~((values >= lower * (1 - 1e-9)) & (values <= upper * (1 + 1e-9)))

@@ -150,7 +150,7 @@ def _make_find(rate: Any) -> Any:
                     note_bad(s, i, j, value)
                     return math.nan, a, b, i, j, trials, c0, c1, c2, c3
                 if value > majorant * ROUNDING:
-                    repair(s, i, j, value)
+                    repair(s, i, j, value, majorant)
             if value >= majorant:
                 return waited * unit, a, b, i, j, trials, c0, c1, c2, c3
             u, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)

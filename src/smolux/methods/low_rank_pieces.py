@@ -181,7 +181,7 @@ def make_draw(rate: Any) -> Any:
             if not 0.0 <= value < math.inf:
                 note_bad(s, i, j, value)
                 return -1
-            repair(s, i, j, value / majorant * raised)
+            repair(s, i, j, value / majorant * raised, raised)
         return 1 if x * majorant < value else 0
 
     @piece

@@ -89,7 +89,7 @@ def _draw_ahead(w, s, a, b, c, d):
 @cold_piece
 def _raise_bound(s, w, g, h, i, j, value):
     """Take in a rate above its bound."""
-    repair(s, i, j, value)
+    repair(s, i, j, value, w.high[g, h])
     w.high[g, h] = w.high[h, g] = 1.1 * value
     w.low[g, h] = w.low[h, g] = 0.0
     w.meta[STALE] = 1

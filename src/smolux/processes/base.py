@@ -165,4 +165,4 @@ class RatedBySize(Varying):
     @property
     def parameters(self) -> tuple[Any, ...]:
         """See `LoneProcess.parameters`."""
-        return self.of_size.parameters
+        return self.of_size.arguments

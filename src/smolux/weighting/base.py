@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,6 +13,7 @@ from ..intervals import Interval
 from ..kernels.base import Kernel
 from ..kernels.majorant import Majorant
 from ..kernels.numeric import interval_bounds, sampled_bounds
+from ..laws import proved_or_tried
 
 Float = NDArray[np.float64]
 
@@ -108,21 +110,8 @@ class Weighting:
         def cell(i: Interval, j: Interval) -> Interval:
             return kernel.interval(i, j) * self.interval(i, j)
 
-        def found(a: Any, b: Any, c: Any, d: Any) -> tuple[Float, Float]:
-            try:
-                lower, upper = interval_bounds(cell, a, b, c, d)
-            except TypeError:
-                return sampled_bounds(self.arrays(kernel), a, b, c, d)
-            known = np.isfinite(upper)
-            if not known.all():
-                sampled = sampled_bounds(self.arrays(kernel), a, b, c, d)
-                lower, upper = (
-                    np.where(known, one, other)
-                    for one, other in zip((lower, upper), sampled, strict=True)
-                )
-            return lower, upper
-
-        return found
+        prove = partial(interval_bounds, cell)
+        return partial(proved_or_tried, prove, partial(sampled_bounds, self.arrays(kernel)))
 
     def majorant(self, kernel: Kernel) -> Majorant | None:
         """Return a majorant of the simulated rate; None if none is known, see `bounds` then."""
