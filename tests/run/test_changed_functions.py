@@ -157,6 +157,16 @@ def test_the_solver_sees_the_change(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found[0] != pytest.approx(found[1], rel=0.01)
 
 
+def test_rates_asked_for_outside_a_run_see_the_change(monkeypatch: pytest.MonkeyPatch) -> None:
+    process = processes.Fragmentation(splits)
+    sizes, found = np.arange(1.0, 9.0), []
+    for value in (0.5, 3.0):
+        monkeypatch.setitem(globals(), "height", value)
+        rates, gain = process.rates(sizes), process.gain(sizes, sizes, sizes)
+        found.append((rates / value, gain / value))
+    np.testing.assert_allclose(*found, rtol=1e-12)
+
+
 def test_a_plan_is_sent_by_value(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(globals(), "height", 3.0)
     sent = pickle.dumps(planned(sx.Model(sx.kernels.from_function(by_helper))))

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..callables import spread
 from ..checks import is_number
+from ..content import frozen
 from ..errors import InputError
 from ..kernels import Constant, formula, from_dict, from_function
 from ..kernels.base import Kernel
@@ -123,7 +124,7 @@ class Fragmentation(Varying, LoneProcess):
             return 0.5 * self.pairs.scale * (sizes - 1.0)
         m = len(sizes)
         if m <= _KEPT:
-            return np.asarray(0.5 * _matrix(self.pairs, m).sum(axis=0))
+            return np.asarray(0.5 * _matrix(frozen(self.pairs), m).sum(axis=0))
         rows = max(1, _BLOCK // m)
         return 0.5 * sum(
             (_rows(self.pairs, a, min(a + rows, m), m).sum(axis=0) for a in range(0, m, rows)),
@@ -137,7 +138,7 @@ class Fragmentation(Varying, LoneProcess):
             return self.pairs.scale * np.append(above[1:], 0.0)
         m = len(n)
         if m <= _KEPT:
-            return np.asarray(_matrix(self.pairs, m) @ n)
+            return np.asarray(_matrix(frozen(self.pairs), m) @ n)
         rows = max(1, _BLOCK // m)
         blocks = [_rows(self.pairs, a, min(a + rows, m), m) @ n for a in range(0, m, rows)]
         return np.concatenate(blocks)
