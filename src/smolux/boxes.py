@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .intervals import Interval
+from .sides import Ranges
 
 Float = NDArray[np.float64]
+Int = NDArray[np.int64]
 Function = Callable[[Interval, Interval], Any]
 
-#: the most cells looked at in one call for each bound, besides 32 for each box
-_MOST = 65536
+#: the most cells looked at in one call, besides 32 for each box
+_MOST = 16384
+#: pieces in which what depends on one variable is followed over a side of the first cells, and over
+#: one of the smallest; all sides together have no more than this of them
+_FINE, _LEAST_FINE, _MOST_FINE = 64, 4, 1 << 17
+#: halvings of a cell in a row, if cells are few, and if they are not
+_DEEP, _FEW, _SHALLOW = 4, 256, 2
+#: the weight of what is missing below
+_LOWER = 0.25
+#: what is known not to be smaller than the upper bound by this factor needs no close lower bound
+_NEAR = 0.05
 
 
 def subdivided(
@@ -46,8 +57,8 @@ def subdivided(
     tolerance : float
         Relative distance of a bound from an attained value at which cells are left alone.
     work : int
-        The most cells that are looked at for each bound of each box, besides the first ones; a call
-        for many boxes looks at fewer.
+        The most cells that are looked at for each box, besides the first ones; a call for many
+        boxes looks at fewer.
     geometric : bool
         Whether sides are cut in equal ratios (their edges must be positive) or equal lengths.
     least : float
@@ -65,84 +76,138 @@ def subdivided(
         return np.empty(shape), np.empty(shape)
     # The whole call is limited too: many boxes are looked at for pairs of classes of sizes.
     budget = min(work * boxes.shape[1], _MOST + 32 * boxes.shape[1])
-    plan = (boxes, pieces, tolerance, budget, geometric)
-    upper = _upper(_values(fn, 1.0, least), np.zeros(boxes.shape[1]), *plan)
-    # A lower bound need not be followed to far below the upper one.
-    scale = np.where(np.isfinite(upper), 0.05 * np.abs(upper), 0.0)
-    lower = -_upper(_values(fn, -1.0, least), scale, *plan)
+    x = Ranges(0, boxes[0], boxes[1], pieces, geometric)
+    y = Ranges(1, boxes[2], boxes[3], pieces, geometric)
+    # of one variable alone, cells are its pieces
+    flat = (boxes[0] == boxes[1]).all() or (boxes[2] == boxes[3]).all()
+    fine = 1 if flat else _FINE
+    lower, upper = _bounded(_Over(fn, least, x, y), boxes.shape[1], tolerance, budget, fine)
     return lower.reshape(shape), upper.reshape(shape)
 
 
-def _values(fn: Function, sign: float, least: float) -> Callable[[Float], Interval]:
-    def values(cells: Float) -> Interval:
-        found = fn(Interval(cells[0], cells[1]), Interval(cells[2], cells[3]))
+class _Over(NamedTuple):
+    """The function over cells, which are pairs of ranges by their numbers."""
+
+    fn: Function
+    least: float
+    x: Ranges
+    y: Ranges
+
+    def __call__(self, cells: Int, pieces: int) -> tuple[Float, Float]:
+        x, y = (
+            side.side(wanted, pieces, _MOST_FINE)
+            for side, wanted in zip((self.x, self.y), cells, strict=True)
+        )
+        found = self.fn(x, y)
         if not isinstance(found, Interval):
             found = Interval(float(found))
-        lo = np.broadcast_to(np.maximum(found.lo, least), cells.shape[1:])
-        hi = np.broadcast_to(np.maximum(found.hi, least), cells.shape[1:])
-        return Interval(lo, hi) if sign > 0 else Interval(-hi, -lo)
+        shape = cells.shape[1:]
+        lo = np.broadcast_to(np.maximum(found.lo, self.least), shape)
+        return lo, np.broadcast_to(np.maximum(found.hi, self.least), shape)
 
-    return values
+    def divisible(self, cells: Int) -> NDArray[np.bool_]:
+        x, y = cells
+        return (self.x.high[x] > self.x.low[x]) | (self.y.high[y] > self.y.low[y])
 
 
-def _upper(
-    values: Callable[[Float], Interval],
-    scale: Float,
-    boxes: Float,
-    pieces: int,
-    tolerance: float,
-    budget: int,
-    geometric: bool,
-) -> Float:
-    count = boxes.shape[1]
-    attained, settled = np.full(count, -np.inf), np.full(count, -np.inf)
-    cells, owner = _cut(boxes, pieces, geometric)
+class _Parts(NamedTuple):
+    """Cells, and points at corners of them, each with the number of its box."""
+
+    cells: Int
+    owner: Int
+    points: Int
+    place: Int
+
+    @classmethod
+    def of_boxes(cls, over: _Over, boxes: int) -> _Parts:
+        """All cells to begin with."""
+
+        def all_of(x: Int, y: Int) -> tuple[Int, Int]:
+            shape = (len(x), len(y), boxes)
+            pairs = np.broadcast_to(x[:, None], shape), np.broadcast_to(y[None], shape)
+            box = np.broadcast_to(np.arange(boxes), shape)
+            return np.stack([side.ravel() for side in pairs]), box.ravel()
+
+        return cls(*all_of(over.x.pieces, over.y.pieces), *all_of(over.x.corners, over.y.corners))
+
+    @classmethod
+    def of_cells(cls, over: _Over, cells: Int, owner: Int, times: int) -> _Parts:
+        """Halve cells, as often as said; corners only where they are new."""
+        points, place = [], []
+        for _ in range(times):
+            cells, corners = _halves(over, cells)
+            owner = np.tile(owner, 2)
+            points.append(corners)
+            place.append(owner)
+        return cls(cells, owner, np.concatenate(points, axis=1), np.concatenate(place))
+
+
+def _bounded(
+    over: _Over, count: int, tolerance: float, budget: int, fine: int
+) -> tuple[Float, Float]:
+    #: values attained, and bounds of the cells that are left as they are
+    highest, lowest = np.full(count, -np.inf), np.full(count, np.inf)
+    upper, lower = np.full(count, -np.inf), np.full(count, np.inf)
+    parts = _Parts.of_boxes(over, count)
     while True:
-        top = values(cells).hi
-        a, b, c, d = cells
-        for x, y in ((a, c), (a, d), (b, c), (b, d)):
-            np.maximum.at(attained, owner, values(np.stack([x, x, y, y])).lo)
-        goal = np.maximum(attained + tolerance * np.maximum(np.abs(attained), scale), settled)[
-            owner
-        ]
-        # An attained value that is not finite leaves nothing to improve.
-        open_ = (top > goal) & np.isfinite(attained[owner]) & ((b > a) | (d > c))
-        chosen = np.flatnonzero(open_)
-        if 2 * len(chosen) > budget:
-            chosen = np.empty(0, int)
+        cells, owner = parts.cells, parts.owner
+        found = over(np.concatenate([cells, parts.points], axis=1), fine)
+        (bottom, low), (top, high) = (np.split(x, [cells.shape[1]]) for x in found)
+        np.maximum.at(highest, parts.place, low)
+        np.minimum.at(lowest, parts.place, high)
+        excess = _excess(bottom, top, owner, (lower, upper), (lowest, highest), tolerance)
+        chosen = np.flatnonzero((excess > 0.0) & over.divisible(cells))
+        times = _DEEP if len(chosen) <= _FEW else _SHALLOW
+        affordable = budget >> times
+        if len(chosen) > affordable:  # the widest of them
+            chosen = chosen[np.argsort(-excess[chosen], kind="stable")[:affordable]]
         left = np.ones(len(owner), bool)
         left[chosen] = False
-        np.maximum.at(settled, owner[left], top[left])
+        np.maximum.at(upper, owner[left], top[left])
+        np.minimum.at(lower, owner[left], bottom[left])
         if not len(chosen):
-            return settled
-        budget -= 2 * len(chosen)
-        cells, owner = _halve(cells[:, chosen], geometric), np.tile(owner[chosen], 2)
+            return lower, upper
+        budget -= len(chosen) << times
+        parts = _Parts.of_cells(over, cells[:, chosen], owner[chosen], times)
+        fine = max(fine >> (times // 2), min(fine, _LEAST_FINE))
 
 
-def _cut(boxes: Float, pieces: int, geometric: bool) -> tuple[Float, NDArray[np.int64]]:
-    """Cut boxes into cells; the outer edges are kept to the last bit."""
-    share = np.linspace(0.0, 1.0, pieces + 1)[:, None]
-
-    def edges(low: Float, high: Float) -> Float:
-        inner = low * (high / low) ** share if geometric else low + (high - low) * share
-        inner = np.clip(inner, low, high)
-        inner[0], inner[-1] = low, high
-        return inner
-
-    x, y = edges(boxes[0], boxes[1]), edges(boxes[2], boxes[3])
-    shape = (pieces, pieces, boxes.shape[1])
-    sides = (x[:-1, None], x[1:, None], y[None, :-1], y[None, 1:])
-    cells = np.stack([np.broadcast_to(side, shape).ravel() for side in sides])
-    return cells, np.broadcast_to(np.arange(boxes.shape[1]), shape).ravel()
-
-
-def _halve(cells: Float, geometric: bool) -> Float:
-    """Halve each cell along its longer side."""
-    a, b, c, d = cells
+def _excess(
+    bottom: Float,
+    top: Float,
+    owner: Int,
+    settled: tuple[Float, Float],
+    attained: tuple[Float, Float],
+    tolerance: float,
+) -> Float:
+    """How far beyond the values attained those in a cell may be; none is worth no effort."""
+    lowest, highest = attained
+    size = np.abs(highest)
+    most = np.maximum(highest + tolerance * size, settled[1])
+    # A lower bound need not be followed to far below the upper one.
+    scale = np.where(np.isfinite(size), _NEAR * size, 0.0)
+    least = np.minimum(lowest - tolerance * np.maximum(np.abs(lowest), scale), settled[0])
     with np.errstate(all="ignore"):
-        first = b / a >= d / c if geometric else b - a >= d - c
-    low, high = np.where(first, a, c), np.where(first, b, d)
-    middle = np.clip(np.sqrt(low) * np.sqrt(high) if geometric else 0.5 * (low + high), low, high)
-    one = np.stack([a, np.where(first, middle, b), c, np.where(first, d, middle)])
-    two = np.stack([np.where(first, middle, a), b, np.where(first, c, middle), d])
-    return np.concatenate([one, two], axis=1)
+        above = (top - most[owner]) / np.abs(most[owner])
+        below = _LOWER * (least[owner] - bottom) / np.maximum(np.abs(least), scale)[owner]
+    # An attained value that is not finite leaves nothing to improve.
+    above[~np.isfinite(highest)[owner] | (top <= most[owner])] = 0.0
+    below[~np.isfinite(lowest)[owner] | (bottom >= least[owner])] = 0.0
+    return np.fmax(above, below)
+
+
+def _halves(over: _Over, cells: Int) -> tuple[Int, Int]:
+    """Halve each cell along its longer side; return the halves, and the corners that are new."""
+    x, y = cells
+    a, b, c, d = over.x.low[x], over.x.high[x], over.y.low[y], over.y.high[y]
+    with np.errstate(all="ignore"):
+        first = b / a >= d / c if over.x.geometric else b - a >= d - c
+    halves, corners = np.tile(cells, 2), np.empty((2, 2 * len(x)), np.int64)
+    for axis, side, mine in ((0, over.x, first), (1, over.y, ~first)):
+        lower, upper, middle = side.halved(cells[axis, mine])
+        both = np.tile(mine, 2)
+        halves[axis, both] = np.concatenate([lower, upper])
+        corners[axis, both] = np.tile(middle, 2)
+        other = (over.y, over.x)[axis]
+        corners[1 - axis, both] = other.ends[:, cells[1 - axis, mine]].ravel()
+    return halves, corners

@@ -13,6 +13,7 @@ doi:10.1137/1.9780898717716.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
 from typing import Any, NoReturn
 
 import numpy as np
@@ -30,13 +31,32 @@ class UndecidedError(TypeError):
     """A comparison of intervals: the answer may differ within them."""
 
 
+def _positive(x: Float) -> bool:
+    """Whether all numbers are above zero and finite."""
+    return x.size > 0 and bool(x.min() > 0.0 and x.max() < np.inf)
+
+
+def _below(x: Float) -> Float:
+    """Return the numbers just below; of positive ones by counting, as NumPy takes long."""
+    if _positive(x):
+        return (x.view(np.int64) - 1).view(np.float64)
+    return np.nextafter(x, -np.inf)
+
+
+def _above(x: Float) -> Float:
+    """Return the numbers just above."""
+    if _positive(x):
+        return (x.view(np.int64) + 1).view(np.float64)
+    return np.nextafter(x, np.inf)
+
+
 def _down(x: Float) -> Float:
     # A sum or difference that is zero is exact, and so is a product by zero.
-    return np.where(x == 0, x, np.nextafter(x, -np.inf))
+    return _below(x) if _positive(x) else np.where(x == 0, x, np.nextafter(x, -np.inf))
 
 
 def _up(x: Float) -> Float:
-    return np.where(x == 0, x, np.nextafter(x, np.inf))
+    return _above(x) if _positive(x) else np.where(x == 0, x, np.nextafter(x, np.inf))
 
 
 class Interval:
@@ -97,6 +117,10 @@ class Interval:
         o = _as_interval(other)
         if o is None:
             return NotImplemented
+        if _positive(self.lo) and _positive(o.lo):
+            with np.errstate(all="ignore"):
+                lo, hi = self.lo * o.lo, self.hi * o.hi
+                return Interval(np.maximum(_below(lo), 0.0), _above(hi))
         with np.errstate(all="ignore"):
             ends = [x * y for x in (self.lo, self.hi) for y in (o.lo, o.hi)]
             # An infinite end is not attained, so zero times infinity is zero.
@@ -128,10 +152,10 @@ class Interval:
             return NotImplemented
         # For a base that is not negative, monotone in either argument: the corners tell.
         base = (np.maximum(self.lo, 0.0), np.where(self.hi < 0, np.nan, self.hi))
+        exponents = (o.lo,) if o.hi is o.lo else (o.lo, o.hi)
         with np.errstate(all="ignore"):
-            ends = [np.power(x, y) for x in base for y in (o.lo, o.hi)]
-        lo = np.minimum(np.minimum(ends[0], ends[1]), np.minimum(ends[2], ends[3]))
-        hi = np.maximum(np.maximum(ends[0], ends[1]), np.maximum(ends[2], ends[3]))
+            ends = [np.power(x, y) for x in base for y in exponents]
+        lo, hi = reduce(np.minimum, ends), reduce(np.maximum, ends)
         return _with_negative_base(self, o, _wider(lo, hi, least=0.0))
 
     def __rpow__(self, other: Any) -> Any:
@@ -174,6 +198,9 @@ def _wider(lo: Float, hi: Float, least: float = -np.inf, most: float = np.inf) -
 
 
 def _reciprocal(x: Interval) -> Interval:
+    if _positive(x.lo):
+        with np.errstate(all="ignore"):
+            return Interval(np.maximum(_below(1.0 / x.hi), 0.0), _above(1.0 / x.lo))
     with np.errstate(all="ignore"):
         lo = np.where(x.hi == 0, -np.inf, np.nextafter(1.0 / x.hi, -np.inf))
         hi = np.where(x.lo == 0, np.inf, np.nextafter(1.0 / x.lo, np.inf))
