@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
@@ -29,11 +28,12 @@ from .core.weights import (
     make_weight,
 )
 from .errors import InputError
-from .kernels.base import Kernel
 from .methods.base import Method, Rates
 from .model import Model
 from .processes import Aggregation, Removal, Source
 from .processes.base import LoneProcess, PairProcess, Process
+from .remembered import bounds_of, timed
+from .tables import evaluated, latest
 from .timefunction import TimeFunction
 from .weighting import Number
 from .weighting.base import Weighting
@@ -223,53 +223,21 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
     return make_loop(pieces, next_event, fire)
 
 
-class _Proved:
-    """Bounds that are remembered: proofs are dear, and every group of replicas asks for the same.
-
-    Parameters
-    ----------
-    bounds : callable
-        See `smolux.kernels.base.Kernel.bounds`.
-    """
-
-    _MOST = 64
-
-    def __init__(self, bounds: Callable[..., tuple[Any, Any]]) -> None:
-        self._bounds = bounds
-        self._known: dict[bytes, tuple[Any, Any]] = {}
-
-    def __call__(self, a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any]:
-        boxes = np.stack(np.broadcast_arrays(*(np.asarray(x, float) for x in (a, b, c, d))))
-        key = hashlib.sha256(repr(boxes.shape).encode() + boxes.tobytes()).digest()
-        found = self._known.get(key)
-        if found is None:
-            found = self._bounds(a, b, c, d)
-            while len(self._known) >= self._MOST:
-                self._known.pop(next(iter(self._known)), None)
-            self._known[key] = found
-        return found[0].copy(), found[1].copy()
-
-
-@lru_cache(maxsize=16)
-def _proved(kernel: Kernel, weighting: Weighting, rate: str) -> _Proved:
-    return _Proved(weighting.bounds(kernel))
-
-
-def _bounds_of(kernel: Kernel, weighting: Weighting) -> Callable[..., tuple[Any, Any]]:
-    try:
-        return _proved(kernel, weighting, digest(kernel.rate))
-    except TypeError:  # parameters that have no hash
-        return weighting.bounds(kernel)
-
-
 def rates_for(model: Model, weighting: Weighting) -> Rates:
     """Return what a method needs to know of the simulated rate."""
     kernel, weighting = frozen(model.kernel), frozen(weighting)
     weighted = weighting.weight is not None
+    arrays = timed(weighting.arrays(evaluated(kernel)))
+
+    @timed
+    def table(largest: int) -> Any:
+        return latest(kernel, weighting, arrays, largest)
+
     return Rates(
         (*kernel.parameters, *weighting.parameters),
-        weighting.arrays(kernel),
-        _bounds_of(kernel, weighting),
+        arrays,
+        table,
+        timed(bounds_of(kernel, weighting)),
         kernel.cheap and weighting.cheap,
         kernel.rigorous and weighting.rigorous,
         weighting.majorant(kernel),
@@ -337,6 +305,7 @@ def _glimpse(factor: TimeFunction, start: float, end: float) -> float:
     return bound if np.isfinite(bound) else 0.0
 
 
+@timed
 def windows_for(
     processes: Sequence[Process], end: float, weighting: Weighting | None = None
 ) -> Windows:

@@ -140,6 +140,11 @@ class Function:
             result = np.array(values, float)
         return result.reshape(arrays[0].shape)
 
+    def takes_arrays(self, parameters: tuple[float, ...]) -> bool:
+        """Whether a call with two arrays gives what calls with single numbers do."""
+        sizes = np.geomspace(1.0, 2.0 * _COMPARED, 2 * _COMPARED)
+        return self._at_once([sizes, sizes[::-1].copy()], parameters) is not None
+
     def _at_once(self, flat: list[Float], parameters: tuple[float, ...]) -> Float | None:
         size = flat[0].size
         if size < _COMPARED:

@@ -116,6 +116,7 @@ def _put(arrays: dict[str, np.ndarray], key: str, group: Group | Divided) -> dic
     about = {
         "first": group.first,
         "seconds": group.seconds,
+        "bounds_seconds": group.bounds_seconds,
         "populations": [len(replica) for replica in group.distribution],
     }
     if isinstance(group, Divided):
@@ -193,6 +194,7 @@ def _take(
         "windows": Windows(**part("windows")),
         "distribution": distribution,
         "seconds": about["seconds"],
+        "bounds_seconds": about.get("bounds_seconds", 0.0),
     }
     if "parts" not in about:
         return Group(plan, work=plan.method.work_type(**part("work")), **common)

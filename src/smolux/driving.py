@@ -44,6 +44,8 @@ class Progress:
         Estimated from the simulated time done so far; NaN when nothing is known yet.
     compile_seconds : float
         Spent on compiling, not counted in the rate.
+    bounds_seconds : float
+        Processor time spent on bounds and tables of rates, over all threads.
     replicas : int
         Begun so far.
     error, target_error : float
@@ -59,6 +61,7 @@ class Progress:
     replicas: int = 0
     error: float = np.nan
     target_error: float = np.nan
+    bounds_seconds: float = 0.0
 
 
 class Run:
@@ -70,10 +73,13 @@ class Run:
         groups: list[Group | Divided],
         progress: Callable[[Progress], None] | None,
         workers: int,
+        planned: float = 0.0,
     ) -> None:
         self.plan, self.groups, self.progress, self.workers = plan, groups, progress, workers
         self.started = time.perf_counter()
         self.compile_seconds = 0.0
+        #: seconds spent on bounds before there were groups
+        self.planned = planned
         self.verdict: Verdict | None = None
         self.remarks: list[str] = []
 
@@ -121,12 +127,14 @@ class Run:
                 events, fraction, rate, left, self.compile_seconds, self.plan.replicas,
                 np.nan if self.verdict is None else self.verdict.error,
                 np.nan if goal is None else goal.error,
+                self.planned + sum(g.bounds_seconds for g in self.groups),
             )
         )  # fmt: skip
 
     def dataset(self, *remarks: str) -> xr.Dataset:
         """Return what there is."""
         records = to_records(self.plan, self.groups)
+        records.attributes["bounds_seconds"] += self.planned
         records.attributes["wall_seconds"] = time.perf_counter() - self.started
         if self.verdict is not None and records.attributes["complete"]:
             records.attributes["reached_error"] = self.verdict.error
@@ -147,9 +155,10 @@ class Threads(Run):
         checkpoint_every: float,
         time_limit: float | None,
         workers: int,
+        planned: float = 0.0,
         resumed: bool = False,
     ) -> None:
-        super().__init__(plan, groups, progress, workers)
+        super().__init__(plan, groups, progress, workers, planned)
         self.executor, self.checkpoint, self.every = executor, checkpoint, checkpoint_every
         self.limit = np.inf if time_limit is None else time_limit
         self.saved = self.started
@@ -266,8 +275,9 @@ class Elsewhere(Run):
         executor: Executor,
         progress: Callable[[Progress], None] | None,
         workers: int,
+        planned: float = 0.0,
     ) -> None:
-        super().__init__(plan, [], progress, workers)
+        super().__init__(plan, [], progress, workers, planned)
         self.executor = executor
 
     def finish(self) -> xr.Dataset:

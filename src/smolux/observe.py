@@ -180,6 +180,7 @@ def _attributes(plan: Plan, groups: Sequence[Group | Divided]) -> dict[str, obje
         "doublings": int(max(g.state.count[:, DOUBLINGS].max() for g in groups)),
         "events": sum(g.events for g in groups),
         "compute_seconds": sum(g.seconds for g in groups),
+        "bounds_seconds": sum(g.bounds_seconds for g in groups),
         "compile_seconds": max(g.compile_seconds for g in groups),
         "complete": all(g.done for g in groups),
     }

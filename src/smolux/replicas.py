@@ -60,6 +60,7 @@ from .initial import Sizes
 from .model import Model
 from .plan import Plan
 from .processes.base import LoneProcess
+from .remembered import spent
 
 Int = NDArray[np.int64]
 
@@ -83,6 +84,8 @@ class Group:
     distribution: list[list[tuple[Int, Int]]] = field(default_factory=list)
     seconds: float = 0.0
     compile_seconds: float = 0.0
+    #: for bounds and tables of rates, not part of `seconds`
+    bounds_seconds: float = 0.0
     #: what `loop_for` returns for the plan, once it is known: what tells loops apart takes time
     loop: Any = None
     #: parameters of the processes, with tables that fill up as sizes occur
@@ -96,18 +99,15 @@ class Group:
 
         The `loop` is that of a group before, if one had the same model, method and weighting.
         """
+        before = spent()
         populations = initial_populations(plan, range(first, first + count))
         state = empty_state(plan, streams(plan.entropy, first, count))
         rates = rates_for(plan.model, plan.weighting)
         work = plan.method.new_work(rates, populations, state, plan.mass)
-        return cls.of(
-            plan,
-            first,
-            state,
-            work,
-            windows_for(plan.model.processes, plan.times[-1], plan.weighting),
-            loop,
-        )
+        windows = windows_for(plan.model.processes, plan.times[-1], plan.weighting)
+        new = cls.of(plan, first, state, work, windows, loop)
+        new.bounds_seconds = spent() - before
+        return new
 
     @classmethod
     def of(
@@ -192,10 +192,12 @@ class Group:
             self._call(self.codes, budget)
             elapsed = time.perf_counter() - start
             self.seconds += elapsed
+            known = spent()
             self._serve()
-            spent = self._effort() - before
-            if spent > 0.5 * budget:
-                wanted = max(spent * _SLICE / max(elapsed, 1e-6), 1000)
+            self.bounds_seconds += spent() - known
+            done = self._effort() - before
+            if done > 0.5 * budget:
+                wanted = max(done * _SLICE / max(elapsed, 1e-6), 1000)
                 self.budget = int(min(wanted, 1e10, 20 * budget))
             if stop():
                 return

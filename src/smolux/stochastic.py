@@ -19,6 +19,7 @@ from .methods.base import Method
 from .model import Model
 from .pilot import settled
 from .plan import make_plan
+from .remembered import spent
 from .resources import cores
 from .subvolumes import start
 from .weighting.base import Weighting
@@ -149,7 +150,7 @@ def simulate(
     >>> float(ds["moment"].sel(order=1).mean())
     1.0
     """
-    executor = adapted(executor)
+    executor, before = adapted(executor), spent()
     problems = _control_problems(executor, progress, checkpoint, checkpoint_every, time_limit)
     try:
         plan = make_plan(
@@ -161,13 +162,14 @@ def simulate(
     if problems:
         raise InputError(problems)
     plan = settled(plan)
+    planned = spent() - before
     if executor is not None and not isinstance(executor, ThreadPoolExecutor):
-        return Elsewhere(plan, executor, progress, workers_of(executor)).finish()
+        return Elsewhere(plan, executor, progress, workers_of(executor), planned).finish()
     workers = max(1, cores() // plan.subvolumes)
     groups = [start(plan, *part) for part in plan.groups(workers)]
     file = None if checkpoint is None else Path(checkpoint).expanduser()
     return Threads(
-        plan, groups, executor, progress, file, checkpoint_every, time_limit, workers
+        plan, groups, executor, progress, file, checkpoint_every, time_limit, workers, planned
     ).finish()
 
 
@@ -207,7 +209,8 @@ def resume(
     plan, groups = checkpoints.load(file, model)
     workers = max(1, cores() // plan.subvolumes)
     return Threads(
-        plan, groups, executor, progress, file, checkpoint_every, time_limit, workers, True
+        plan, groups, executor, progress, file, checkpoint_every, time_limit, workers,
+        resumed=True,
     ).finish()  # fmt: skip
 
 

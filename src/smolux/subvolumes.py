@@ -76,6 +76,7 @@ class Divided:
     distribution: list[list[tuple[Int, Int]]] = field(default_factory=list)
     seconds: float = 0.0
     compile_seconds: float = 0.0
+    bounds_seconds: float = 0.0
     #: the sub-volumes at the end of a stretch, or while it lasts
     parts: list[Group] = field(default_factory=list)
 
@@ -95,6 +96,7 @@ class Divided:
             stretch=0,
             length=_first_stretch(plan, replica),
             distribution=[[] for _ in range(int(plan.distribution))],
+            bounds_seconds=whole.bounds_seconds,
             parts=[whole],
         )
 
@@ -219,6 +221,7 @@ class Divided:
             self.state.missed[0] += part.state.missed[0]
             clock[[MASS_IN, MASS_OUT]] += part.state.clock[0, [MASS_IN, MASS_OUT]]
             self.seconds += part.seconds
+            self.bounds_seconds += part.bounds_seconds
         clock[EXCESS] = clock[CLOCKS:].sum()
         if count[PARTICLES] == 1 and np.isnan(clock[EXTINCT]):
             clock[EXTINCT] = self.parts[0].state.clock[0, EXTINCT]

@@ -17,6 +17,7 @@ class At:
     events_per_second: float = 2.5e6
     seconds_left: float = 83.0
     compile_seconds: float = 0.0
+    bounds_seconds: float = 0.0
 
 
 def test_a_line_says_all():

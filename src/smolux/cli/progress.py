@@ -35,6 +35,10 @@ class Progress(Protocol):
     def compile_seconds(self) -> float:
         """Spent on compiling."""
 
+    @property
+    def bounds_seconds(self) -> float:
+        """Spent on bounds of rates."""
+
 
 class Display:
     """Shows progress on standard error; called with a `Progress` a few times a second.
@@ -65,7 +69,7 @@ class Display:
         self.check, self.what, self.every, self.clock = check, what, every, clock
         self.unit = "steps" if what == "solving" else "events"
         self.last: Progress | None = None
-        self._due = 0.0
+        self._due = self._bounds = 0.0
         self._bar: Any = None
         self._task: Any = None
 
@@ -90,6 +94,9 @@ class Display:
             self._due = self.clock() + self.every
             if progress.compile_seconds > 0.5:
                 self._print(f"compiled in {duration(progress.compile_seconds)}")
+        if progress.bounds_seconds > max(0.5, 2.0 * self._bounds):
+            self._bounds = progress.bounds_seconds
+            self._print(f"bounds of the rates: {duration(self._bounds)} so far")
         self.last = progress
         if self._bar is not None:
             self._bar.update(

@@ -215,7 +215,8 @@ def _simulate(
     directory.checkpoint.unlink(missing_ok=True)
     say(
         f"simulated in {duration(float(ds.attrs['wall_seconds']))}"
-        f" ({duration(float(ds.attrs['compile_seconds']))} of it compiling)"
+        f" ({duration(float(ds.attrs['compile_seconds']))} of it compiling,"
+        f" {duration(float(ds.attrs['bounds_seconds']))} for bounds of the rates)"
     )
     if case.run is not None and case.run.method == "auto":
         say(f"method {ds.attrs['method']}: {ds.attrs['method_reason']}")

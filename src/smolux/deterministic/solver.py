@@ -53,6 +53,8 @@ class Progress:
         Time reached.
     window : int
         The number of sizes now.
+    bounds_seconds : float
+        Always zero: nothing is bounded.
     """
 
     events: int
@@ -62,6 +64,7 @@ class Progress:
     compile_seconds: float
     time: float
     window: int
+    bounds_seconds: float = 0.0
 
 
 def solve(

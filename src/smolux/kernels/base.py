@@ -49,6 +49,8 @@ class Kernel:
     cheap: ClassVar[bool] = False
     #: whether `bounds` is proved (interval arithmetic or analysis) or only sampled
     rigorous: ClassVar[bool] = True
+    #: whether `bounds` is a search, worth being remembered
+    searched: ClassVar[bool] = False
     #: key of the closed-form solution in `smolux.exact`, for monodisperse starts
     exact: ClassVar[str | None] = None
 

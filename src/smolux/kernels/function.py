@@ -44,6 +44,11 @@ class FunctionKernel(OwnKernel):
             breakpoints=self.breakpoints,
         )
 
+    @cached_property
+    def takes_arrays(self) -> bool:
+        """Whether the function may be called with arrays."""
+        return self.user.takes_arrays(self.values)
+
     @property
     def function(self) -> Callable[..., Any]:
         """The Python function."""

@@ -54,6 +54,11 @@ class OwnKernel(Kernel):
         """Whether `bounds` is proved, by intervals; what is stated is checked at every pair."""
         return self.law.stated is None and always_bounded(self.law.interval)
 
+    @property
+    def searched(self) -> bool:  # type: ignore[override]
+        """See `Kernel.searched`."""
+        return self.law.stated is None
+
     def interval(self, i: Interval, j: Interval) -> Interval:
         """See `Kernel.interval`; as `bounds`, but never sampled."""
         if self.law.stated is not None:

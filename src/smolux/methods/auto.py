@@ -195,12 +195,14 @@ def effort(run: Circumstances) -> tuple[float, float]:
     number = run.particles * (np.full(len(course), _PRESENT) if run.doubles else total / total[0])
     above = np.cumsum(densities[:, ::-1], axis=1)[:, ::-1] / total[:, None]
     present = np.maximum((above * number[:, None] >= 1.0).sum(axis=1) - 1, 0)
-    largest, one = grid.size[present], np.ones(len(course))
+    largest = grid.size[present]
     average, met = np.array([entry[1:] for entry in course]).T
     if not run.doubles:
         largest = np.minimum(largest, max(run.particles * run.sizes[0], 1.0))
         met = np.where(number >= 2.0, met, 0.0)
-    bound = run.rates.bounds(one, largest, one, largest)[1]  # in one call: proofs are dear
+    top, place = np.unique(largest, return_inverse=True)
+    one = np.ones(len(top))
+    bound = run.rates.bounds(one, top, one, top)[1][place]  # in one call: proofs are dear
     with np.errstate(all="ignore"):
         candidates = np.where(met > 0.0, np.maximum(bound / average, 1.0), 0.0)
     events = float(met @ number)

@@ -27,6 +27,8 @@ class Rates:
     parameters : tuple of float
     arrays : callable
         ``arrays(i, j)`` on arrays of sizes.
+    table : callable
+        ``table(largest)``: rates of the sizes ``1 .. largest`` with each other.
     bounds : callable
         See `smolux.kernels.base.Kernel.bounds`.
     cheap : bool
@@ -43,17 +45,13 @@ class Rates:
 
     parameters: tuple[float, ...]
     arrays: Callable[[Any, Any], Float]
+    table: Callable[[int], Float]
     bounds: Callable[..., tuple[Float, Float]]
     cheap: bool
     rigorous: bool
     majorant: Majorant | None = None
     physical: Callable[[Any, Any], Float] | None = None
     weights: Callable[[Any], Float] | None = None
-
-    def table(self, largest: int) -> Float:
-        """Rates of the sizes ``1 .. largest`` with each other."""
-        k = np.arange(1.0, largest + 1)
-        return np.ascontiguousarray(self.arrays(k[:, None], k[None, :]), float)
 
 
 class Method:

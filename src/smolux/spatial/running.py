@@ -50,6 +50,8 @@ class SpatialProgress:
         Not known: NaN.
     compile_seconds : float
         Until the first slice was done.
+    bounds_seconds : float
+        Always zero: nothing is bounded.
     """
 
     events: int
@@ -59,6 +61,7 @@ class SpatialProgress:
     events_per_second: float
     seconds_left: float
     compile_seconds: float
+    bounds_seconds: float = 0.0
 
     @property
     def note(self) -> str:

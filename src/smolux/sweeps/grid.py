@@ -43,7 +43,7 @@ class SweepProgress:
         Share of the points that is done, a part of the present one included.
     events : int
         Collisions since the sweep was started or gone on with.
-    events_per_second, seconds_left, compile_seconds : float
+    events_per_second, seconds_left, compile_seconds, bounds_seconds : float
     """
 
     points: int
@@ -54,6 +54,7 @@ class SweepProgress:
     events_per_second: float
     seconds_left: float
     compile_seconds: float
+    bounds_seconds: float = 0.0
 
     @property
     def note(self) -> str:
@@ -173,7 +174,7 @@ class _Running:
         self.done = sum(self._is_done(p) for p in self.points)
         self.begun_with = self.done
         self.started = time.perf_counter()
-        self.events, self.compile_seconds = 0, 0.0
+        self.events, self.compile_seconds, self.bounds_seconds = 0, 0.0, 0.0
 
     def finish(self) -> xr.Dataset:
         """Do what is missing and gather everything."""
@@ -208,11 +209,12 @@ class _Running:
 
     def _here(self, executor: Executor | None, missing: list[Point]) -> None:
         for point in missing:
-            before = (self.events, self.compile_seconds)
+            before = self.events, self.compile_seconds, self.bounds_seconds
 
-            def tell(progress: Any, before: tuple[int, float] = before) -> None:
+            def tell(progress: Any, before: tuple[int, float, float] = before) -> None:
                 self.events = before[0] + progress.events
                 self.compile_seconds = before[1] + progress.compile_seconds
+                self.bounds_seconds = before[2] + progress.bounds_seconds
                 self._tell(progress.fraction)
 
             try:
@@ -259,6 +261,7 @@ class _Running:
             SweepProgress(
                 points, self.done, len(self.failures), min((self.done + part) / points, 1.0),
                 self.events, self.events / spent if spent > 0 else 0.0, left, self.compile_seconds,
+                self.bounds_seconds,
             )
         )  # fmt: skip
 

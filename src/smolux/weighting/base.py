@@ -91,8 +91,8 @@ class Weighting:
         """Bounds of the same over intervals of sizes; `TypeError` if there are none."""
         raise NotImplementedError
 
-    def arrays(self, kernel: Kernel) -> Callable[[Any, Any], Float]:
-        """Return the simulated rate on arrays of sizes."""
+    def arrays(self, kernel: Callable[[Any, Any], Float]) -> Callable[[Any, Any], Float]:
+        """Return the simulated rate on arrays of sizes, of that of the kernel."""
 
         def rate(i: Any, j: Any) -> Float:
             with np.errstate(all="ignore"):

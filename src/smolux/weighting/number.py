@@ -34,7 +34,7 @@ class Number(Weighting):
         """See `Weighting.weights`."""
         return np.ones(np.shape(sizes))
 
-    def arrays(self, kernel: Kernel) -> Callable[[Any, Any], Float]:
+    def arrays(self, kernel: Callable[[Any, Any], Float]) -> Callable[[Any, Any], Float]:
         """See `Weighting.arrays`."""
         return kernel
 
