@@ -17,9 +17,8 @@ Function = Callable[[Interval, Interval], Any]
 
 #: the most cells looked at in one call, besides 32 for each box
 _MOST = 16384
-#: pieces in which what depends on one variable is followed over a side of the first cells, and over
-#: one of the smallest; all sides together have no more than this of them
-_FINE, _LEAST_FINE, _MOST_FINE = 64, 4, 1 << 17
+#: pieces in which what depends on one variable is followed, over all sides of cells together
+_FINE = 16384
 #: halvings of a cell in a row, if cells are few, and if they are not
 _DEEP, _FEW, _SHALLOW = 4, 256, 2
 #: the weight of what is missing below
@@ -80,8 +79,8 @@ def subdivided(
     y = Ranges(1, boxes[2], boxes[3], pieces, geometric)
     # of one variable alone, cells are its pieces
     flat = (boxes[0] == boxes[1]).all() or (boxes[2] == boxes[3]).all()
-    fine = 1 if flat else _FINE
-    lower, upper = _bounded(_Over(fn, least, x, y), boxes.shape[1], tolerance, budget, fine)
+    over = _Over(fn, least, x, y, 0 if flat else _FINE)
+    lower, upper = _bounded(over, boxes.shape[1], tolerance, budget)
     return lower.reshape(shape), upper.reshape(shape)
 
 
@@ -92,13 +91,10 @@ class _Over(NamedTuple):
     least: float
     x: Ranges
     y: Ranges
+    fine: int
 
-    def __call__(self, cells: Int, pieces: int) -> tuple[Float, Float]:
-        x, y = (
-            side.side(wanted, pieces, _MOST_FINE)
-            for side, wanted in zip((self.x, self.y), cells, strict=True)
-        )
-        found = self.fn(x, y)
+    def __call__(self, cells: Int) -> tuple[Float, Float]:
+        found = self.fn(self.x.side(cells[0], self.fine), self.y.side(cells[1], self.fine))
         if not isinstance(found, Interval):
             found = Interval(float(found))
         shape = cells.shape[1:]
@@ -142,16 +138,14 @@ class _Parts(NamedTuple):
         return cls(cells, owner, np.concatenate(points, axis=1), np.concatenate(place))
 
 
-def _bounded(
-    over: _Over, count: int, tolerance: float, budget: int, fine: int
-) -> tuple[Float, Float]:
+def _bounded(over: _Over, count: int, tolerance: float, budget: int) -> tuple[Float, Float]:
     #: values attained, and bounds of the cells that are left as they are
     highest, lowest = np.full(count, -np.inf), np.full(count, np.inf)
     upper, lower = np.full(count, -np.inf), np.full(count, np.inf)
     parts = _Parts.of_boxes(over, count)
     while True:
         cells, owner = parts.cells, parts.owner
-        found = over(np.concatenate([cells, parts.points], axis=1), fine)
+        found = over(np.concatenate([cells, parts.points], axis=1))
         (bottom, low), (top, high) = (np.split(x, [cells.shape[1]]) for x in found)
         np.maximum.at(highest, parts.place, low)
         np.minimum.at(lowest, parts.place, high)
@@ -169,7 +163,6 @@ def _bounded(
             return lower, upper
         budget -= len(chosen) << times
         parts = _Parts.of_cells(over, cells[:, chosen], owner[chosen], times)
-        fine = max(fine >> (times // 2), min(fine, _LEAST_FINE))
 
 
 def _excess(

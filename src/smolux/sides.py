@@ -20,6 +20,9 @@ from .intervals import UFUNCS, Interval
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
+#: pieces of a range
+_LEAST, _MOST = 4, 1024
+
 
 class Side(Interval):
     """Intervals of one of two variables, in fine pieces until the other one comes in.
@@ -181,12 +184,12 @@ class Ranges:
             self._cut[:, new] = lower, upper, point
         return self._cut[:, wanted]
 
-    def side(self, wanted: Int, pieces: int, most: int) -> Side:
-        """Return ranges as intervals in fine pieces, no more than `most` in all."""
+    def side(self, wanted: Int, fine: int) -> Side:
+        """Return ranges as intervals in about so many pieces in all; whole, if it is none."""
         asked = np.zeros(len(self.low), bool)
         asked[wanted] = True
         row = np.cumsum(asked) - 1
-        pieces = max(min(pieces, most // (row[-1] + 1)), 1)
+        pieces = min(max(fine // (row[-1] + 1), _LEAST), _MOST) if fine else 1
         edges = cut(self.low[asked], self.high[asked], pieces, self.geometric).T
         return Side(self.axis, row[wanted], Interval(edges[:, :-1], edges[:, 1:]))
 

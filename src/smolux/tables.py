@@ -66,6 +66,10 @@ class Latest:
         self._held: tuple[Any, Float] | None = None
         self._lock = threading.Lock()
 
+    def forget(self) -> None:
+        """Begin anew."""
+        self._held = None
+
     def __call__(
         self, kernel: Kernel, weighting: Weighting, arrays: Callable[..., Float], largest: int
     ) -> Float:

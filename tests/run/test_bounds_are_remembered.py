@@ -37,7 +37,7 @@ def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
 def forget() -> None:
     """Forget all, as a new process does."""
     remembered._bounds_of.cache_clear()
-    tables.latest.__init__()  # type: ignore[misc]
+    tables.latest.forget()
 
 
 def step(i: float, j: float) -> float:
@@ -149,7 +149,7 @@ def test_few_cells_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     values = kernel(a * (b / a) ** share[:, None], c * (d / c) ** share).reshape(len(upper), -1)
     assert (values <= upper[:, None]).all()
     assert (values >= lower[:, None]).all()
-    assert (upper <= 1.05 * values.max(axis=1)).all()
+    assert (upper <= 1.025 * values.max(axis=1)).all()
     assert (lower >= 0.95 * values.min(axis=1)).all()
 
 

@@ -177,6 +177,7 @@ FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {
     "ridge": lambda x, y: np.exp(-((np.log(x) - np.log(y)) ** 2)),
     "zero": lambda x, y: abs(x - y),
     "constant": lambda x, y: 3.0,
+    "cancelled": lambda x, y: ((x + 9) ** 3 - x**3) / (27 * (x + 3)) - x / 2 + np.sqrt(y),
 }
 
 
