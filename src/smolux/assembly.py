@@ -259,6 +259,7 @@ def factor_parameters(processes: Sequence[Process]) -> Parameters:
     )
 
 
+@timed
 def bound_splits(processes: Sequence[Process], parameters: Parameters, size: int) -> None:
     """Bound the splits of the octave of a size, for which the loop returned `SPLITS`."""
     slots, edges = slots_beside(size), slot_edges(LONE_BITS).astype(float)

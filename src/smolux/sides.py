@@ -21,7 +21,7 @@ Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 #: pieces of a range
-_LEAST, _MOST = 4, 1024
+_LEAST, _MOST = 4, 128
 
 
 class Side(Interval):

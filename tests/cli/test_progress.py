@@ -39,6 +39,14 @@ def test_without_a_terminal_there_is_a_line_now_and_then(capsys):
     assert [text.split(" %")[0] for text in lines[1:]] == ["29", "57", "86"]
 
 
+def test_bounds_that_take_long_are_told_now_and_then(capsys):
+    with Display(terminal=False) as display:
+        for second in (0.1, 0.6, 0.9, 1.3, 2.0):
+            display(At(0.5, bounds_seconds=second))
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [f"bounds of the rates: {x} s so far" for x in ("0.6", "1.3")]
+
+
 def test_in_a_terminal_there_is_a_bar(capsys):
     with Display(terminal=True) as display:
         display(At(0.25, compile_seconds=2.0))
