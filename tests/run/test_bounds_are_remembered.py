@@ -19,6 +19,7 @@ import smolux as sx
 from smolux import remembered, tables
 from smolux.assembly import rates_for
 from smolux.kernels import Additive
+from smolux.laws import Law
 from smolux.weighting import MassFlow, Number, WeightFunction
 
 BOXES = [np.array(side, float) for side in ([1, 2, 9], [1, 3, 11], [2, 2, 40], [4, 3, 47])]
@@ -118,14 +119,14 @@ class Looked:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.calls = self.cells = 0
-        plain = sx.kernels.FunctionKernel._interval
+        plain = Law.interval
 
-        def counted(kernel: Any, i: Any, j: Any) -> Any:
+        def counted(law: Any, i: Any, j: Any) -> Any:
             if np.size(i.lo) > 1:  # else it is asked whether there are bounds at all
                 self.calls, self.cells = self.calls + 1, self.cells + np.size(i.lo)
-            return plain(kernel, i, j)
+            return plain(law, i, j)
 
-        monkeypatch.setattr(sx.kernels.FunctionKernel, "_interval", counted)
+        monkeypatch.setattr(Law, "interval", counted)
 
 
 def rates_of(kernel: Any, weighting: Any) -> Any:
