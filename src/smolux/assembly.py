@@ -267,7 +267,8 @@ def bound_splits(processes: Sequence[Process], parameters: Parameters, size: int
     lone = [p for p in processes if isinstance(p, LoneProcess)]
     for process, own in zip(lone, parameters.lone, strict=True):
         if process.splits:
-            fill(own[1], slots, *process.split_bounds(low, high))
+            bounds = bounds_of(frozen(process.pairs), Number())
+            fill(own[1], slots, *process.split_bounds(low, high, bounds))
 
 
 def _edges(end: float, factors: Sequence[TimeFunction]) -> tuple[float, ...]:

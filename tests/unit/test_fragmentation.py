@@ -46,7 +46,7 @@ def test_bounds_hold_in_the_bins(law: object) -> None:
     process = Fragmentation(law)
     slots = splits.slots_beside(20_000)
     low, high = EDGES[slots], EDGES[1:][slots] - 1.0
-    bounds, widths, _ = process.split_bounds(low, high)
+    bounds, widths, _ = process.split_bounds(low, high, process.pairs.bounds)
     assert np.isfinite(bounds).all()
     rng = np.random.default_rng(1)
     for s in range(len(low)):
@@ -65,7 +65,8 @@ def test_narrow_laws_are_told_apart() -> None:
     low, high = EDGES[slots], EDGES[1:][slots] - 1.0
     for law, narrow in ((halves, True), ("2/(i+j-1)", False), ("1/(i*j)", False)):
         known = splits.new_splits()
-        splits.fill(known, slots, *Fragmentation(law).split_bounds(low, high))
+        process = Fragmentation(law)
+        splits.fill(known, slots, *process.split_bounds(low, high, process.pairs.bounds))
         assert known.narrow[:8].tolist() == [narrow] * 8
         assert not known.narrow[8:].any()
         assert (known.bounds[8:, 0] == -1.0).all()

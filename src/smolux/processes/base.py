@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.base import Kernel
 from ..sizefunction import SizeFunction
 from ..timefunction import TimeFunction
 
@@ -110,10 +111,18 @@ class LoneProcess(Process):
         """What `law` takes last."""
         raise NotImplementedError
 
-    def split_bounds(self, low: Float, high: Float) -> tuple[Float, Float, Float]:
+    @property
+    def pairs(self) -> Kernel:
+        """The law of a process that `splits`, which is of the same kind as a kernel."""
+        raise NotImplementedError
+
+    def split_bounds(
+        self, low: Float, high: Float, bounds: Callable[..., tuple[Float, Float]]
+    ) -> tuple[Float, Float, Float]:
         """Bounds of the law of a process that `splits`, over ranges of sizes of one octave.
 
-        The bins of splits are those of `smolux.core.splits.stretch`.
+        The bins of splits are those of `smolux.core.splits.stretch`; `bounds` are the bounds of
+        `pairs`, however they are found.
 
         Returns
         -------

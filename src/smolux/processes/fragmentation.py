@@ -106,10 +106,12 @@ class Fragmentation(Varying, LoneProcess):
         """See `LoneProcess.parameters`."""
         return self.pairs.parameters
 
-    def split_bounds(self, low: Float, high: Float) -> tuple[Float, Float, Float]:
+    def split_bounds(
+        self, low: Float, high: Float, bounds: Callable[..., tuple[Float, Float]]
+    ) -> tuple[Float, Float, Float]:
         """See `LoneProcess.split_bounds`."""
         (a, b, c, d), widths = _bins(low, high)
-        bound = np.asarray(self.pairs.bounds(a, b, c, d)[1])
+        bound = bounds(a, b, c, d)[1]
         # in no step with any period
         i = np.rint(a + (b - a) * spread(_TRIED)[:, None, None])
         sizes = low[:, None] + np.arange(2.0)[:, None, None, None]  # an even one and an odd one
