@@ -17,10 +17,12 @@ import numpy as np
 import pytest
 
 import smolux as sx
+from smolux import files
 from smolux.assembly import loop_for
 from smolux.content import digest
 from smolux.core import compile as compiling
 from smolux.core.compile import cache_directory, statistics
+from smolux.files import kept
 from smolux.weighting import WEIGHTINGS, Number
 
 #: a function with everything that an edit may touch
@@ -211,6 +213,48 @@ def test_a_damaged_entry(cache: Path, damage: str) -> None:
     path.write_bytes(broken[damage])
     assert counted(lambda: loop_of(SOURCE)(3.0)) == (6.0, 0, 1)
     assert counted(lambda: loop_of(SOURCE)(3.0)) == (6.0, 1, 0)  # it was written again
+
+
+def test_one_changed_bit_anywhere_is_seen(cache: Path) -> None:
+    assert loop_of(SOURCE)(3.0) == 6.0
+    (path,) = entries(cache)
+    whole = path.read_bytes()
+    assert kept(path) is not None
+    rng = np.random.default_rng(1)
+    for place in np.append(np.arange(100), rng.integers(len(whole), size=300)):
+        changed = bytearray(whole)
+        changed[place] ^= 1 << rng.integers(8)
+        path.write_bytes(changed)
+        assert kept(path) is None, place
+    assert counted(lambda: loop_of(SOURCE)(3.0)) == (6.0, 0, 1)
+    assert counted(lambda: loop_of(SOURCE)(3.0)) == (6.0, 1, 0)
+
+
+def test_an_entry_in_the_place_of_another_is_none(cache: Path) -> None:
+    assert loop_of(SOURCE)(3.0) == 6.0
+    assert loop_of(SOURCE.replace("make(1.0)", "make(2.0)"))(3.0) == 12.0
+    one, other = entries(cache)
+    contents = one.read_bytes(), other.read_bytes()
+    one.write_bytes(contents[1])
+    other.write_bytes(contents[0])
+    assert counted(lambda: loop_of(SOURCE)(3.0)) == (6.0, 0, 1)
+
+
+def test_what_killed_processes_leave_is_removed(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cache.mkdir()
+    old, new = ".0123abcd.89abcdef.nbc", ".0123abcd.89abcdee.nbc"
+    others = ["tmp_a1b2c3d", "notes.txt", ".hidden", "0123abcd.nbc"]
+    for name in (old, new, *others):
+        (cache / name).write_bytes(b"half")
+        if name != new:
+            os.utime(cache / name, (1e9, 1e9))
+    monkeypatch.setattr(files, "_looked_at", set())
+    assert loop_of(SOURCE)(3.0) == 6.0
+    left = set(os.listdir(cache))
+    assert not {old, "tmp_a1b2c3d"} & left
+    assert {new, *others[1:]} < left  # it may still be written; the others are not ours
 
 
 def test_switched_off(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import pickle
+import subprocess
+import sys
 from typing import Any
 
 import numba
@@ -73,6 +76,33 @@ def test_a_cell_that_is_run_again_is_what_runs(method: str) -> None:
     assert changed == pytest.approx(np.exp(-1.0), abs=0.03)
     exec(CELL, space)
     assert density(space["K"], method) == changed
+
+
+NEW_PROCESS = """
+import json, sys
+import smolux as sx
+from smolux.core.compile import statistics
+space = {"a": 2.0, "__name__": "notebook"}
+exec(sys.argv[1], space)
+model = sx.Model(sx.kernels.from_function(space["K"]), initial=sx.initial.monodisperse(size=1000))
+ds = sx.simulate(
+    model, [1.0], particles=1000, replicas=4, seed=1, population="fixed-volume", method=sys.argv[2]
+)
+print(json.dumps([float(ds["number_density"].mean()), statistics["hits"]]))
+"""
+
+
+def test_a_new_process_finds_the_code_of_what_it_has_seen() -> None:
+    method, space = "acceptance-rejection", {"a": 0.5, "__name__": "notebook"}
+    exec(CELL, space)
+    density(space["K"], method)
+    space["a"] = 2.0
+    here = density(space["K"], method)
+    command = [sys.executable, "-c", NEW_PROCESS, CELL, method]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    # what this process has compiled for the changed function is what that one runs
+    assert json.loads(done.stdout) == [here, 1]
+    assert here == pytest.approx(np.exp(-1.0), abs=0.03)
 
 
 def call(function: Any, x: float) -> float:

@@ -199,6 +199,19 @@ def test_interruption_leaves_the_old_file(tmp_path):
     assert names(tmp_path) == ["state.bin"]
 
 
+def test_what_a_killed_process_left_is_removed(tmp_path, monkeypatch):
+    mine, young, other = ".state.01234567.bin", ".state.89abcdef.bin", ".other.01234567.bin"
+    for name in (mine, young, other):
+        (tmp_path / name).write_bytes(b"half")
+    for name in (mine, other):
+        os.utime(tmp_path / name, (1e9, 1e9))
+    monkeypatch.setattr(files, "_looked_at", set())
+    with files.replacing(tmp_path / "state.bin") as temporary:
+        temporary.write_bytes(b"new")
+    # another process may be writing the young one; the other is of another file
+    assert set(names(tmp_path)) == {"state.bin", young, other}
+
+
 def test_replacing_syncs_before_it_moves(tmp_path, monkeypatch):
     calls = []
     fsync, replace = os.fsync, os.replace

@@ -21,7 +21,6 @@ import os
 import pickle
 import re
 import secrets
-import tempfile
 import types
 from collections.abc import Callable
 from pathlib import Path
@@ -31,6 +30,7 @@ import numba
 import numpy as np
 
 from ..content import INSTALLED, OPTIONS, digest, is_frozen, module_of
+from ..files import keep, kept
 from . import pipeline
 
 try:
@@ -53,7 +53,7 @@ _NO_COUNTING = (
 _NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 #: raised whenever what an entry holds changes
-_FORMAT = 2
+_FORMAT = 3
 
 #: makes an index that is never negative: others may count from the end, which costs instructions
 at = np.uint64
@@ -148,11 +148,12 @@ if _HOOKS:
                 return None
             target_context.refresh()
             try:
-                data = self._path(sig, target_context.codegen()).read_bytes()
+                # code with one bit changed may crash, or give wrong numbers
+                data = kept(self._path(sig, target_context.codegen()))
+                if data is None:
+                    return None
                 result = self._impl.rebuild(target_context, pickle.loads(data))
-            except FileNotFoundError:
-                return None
-            except Exception:  # a damaged or foreign entry is as good as none
+            except Exception:  # an entry that cannot be read is as good as none
                 return None
             statistics["hits"] += 1
             return result
@@ -163,16 +164,7 @@ if _HOOKS:
             with contextlib.suppress(Exception):
                 if not (self._enabled and self._impl.check_cachable(data) and _lasting(data)):
                     return
-                path = self._path(sig, data.codegen)
-                path.parent.mkdir(parents=True, exist_ok=True)
-                fd, temporary = tempfile.mkstemp(dir=path.parent)
-                try:
-                    with os.fdopen(fd, "wb") as f:
-                        f.write(dumps(self._impl.reduce(data)))
-                    os.replace(temporary, path)
-                except BaseException:
-                    os.unlink(temporary)
-                    raise
+                keep(self._path(sig, data.codegen), dumps(self._impl.reduce(data)))
 
 
 def piece(fn: Callable[..., Any] | None = None, /, **options: Any) -> Any:
@@ -228,7 +220,8 @@ def _linked(fn: Any, done: dict[int, Any]) -> Any:
     space: dict[str, Any] = {}
     cells = tuple(types.CellType() for _ in fn.__closure__ or ())
     new = types.FunctionType(fn.__code__, space, fn.__name__, fn.__defaults__, cells)
-    new.__qualname__, new.__module__ = fn.__qualname__, fn.__module__
+    # what finds it on the disk imports its module: ours is always there, the user's may not be
+    new.__qualname__, new.__module__ = fn.__qualname__, __name__
     given = getattr(fn, OPTIONS, {})
     made = done[id(fn)] = _allocating(new, **{k: given[k] for k in _KEPT if k in given})
 
