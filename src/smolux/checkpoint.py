@@ -21,7 +21,7 @@ from .model import Model
 from .model_dict import model_from_dict, model_to_dict
 from .plan import Plan
 from .replicas import Group
-from .subvolumes import Divided
+from .subvolumes import Divided, within
 from .weighting import WEIGHTINGS, Weighting
 
 #: what reading a file that is no checkpoint, or half of one, may raise
@@ -92,6 +92,8 @@ def _plan_from_dict(given: dict[str, Any], model: Model | None) -> Plan:
 
 def save(path: str | Path, plan: Plan, groups: Sequence[Group | Divided]) -> None:
     """Write a checkpoint, whole or not at all; see `smolux.files.replacing`."""
+    if not all(group.intact for group in groups):
+        raise InputError("memory ended while sub-volumes were mixed")
     arrays: dict[str, np.ndarray] = {}
     about = [_put(arrays, str(k), group) for k, group in enumerate(groups)]
     meta = {"version": VERSION, "plan": _plan_to_dict(plan), "groups": about}
@@ -120,7 +122,7 @@ def _put(arrays: dict[str, np.ndarray], key: str, group: Group | Divided) -> dic
         "populations": [len(replica) for replica in group.distribution],
     }
     if isinstance(group, Divided):
-        about |= {"stretch": group.stretch, "length": group.length}
+        about |= {"stretch": group.stretch, "length": group.length, "open": list(group.open)}
         about["parts"] = [_put(arrays, f"{key}/{m}", part) for m, part in enumerate(group.parts)]
     return about
 
@@ -198,8 +200,10 @@ def _take(
     }
     if "parts" not in about:
         return Group(plan, work=plan.method.work_type(**part("work")), **common)
-    alone = replace(plan, subvolumes=1, replicas=1)
+    times = tuple(about.get("open", ()))
+    alone = within(plan, times) if times else replace(plan, subvolumes=1, replicas=1)
     parts: list[Any] = [
         _take(arrays, f"{key}/{m}", each, alone) for m, each in enumerate(about["parts"])
     ]
-    return Divided(plan, stretch=about["stretch"], length=about["length"], parts=parts, **common)
+    stretch = {name: about[name] for name in ("stretch", "length")}
+    return Divided(plan, parts=parts, open=times, **stretch, **common)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, Executor, ThreadPoolExecutor, wait
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Event
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import checkpoint as checkpoints
-from .errors import InputError, Interrupted, WorkerError
+from .errors import InputError, Interrupted, OutOfMemoryError, WorkerError
 from .executors import completed
 from .goal import Verdict, judge, shortfall
 from .observe import observable, to_records
@@ -26,6 +27,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _TICK = 0.2
+_EXHAUSTED = (
+    "memory: there is no more: use fewer particles, replicas, sizes or output times, or let this "
+    "process have more memory"
+)
 
 
 @dataclass(frozen=True)
@@ -131,15 +136,24 @@ class Run:
             )
         )  # fmt: skip
 
-    def dataset(self, *remarks: str) -> xr.Dataset:
+    def dataset(self, *remarks: str, **attributes: object) -> xr.Dataset:
         """Return what there is."""
         records = to_records(self.plan, self.groups)
         records.attributes["bounds_seconds"] += self.planned
+        records.attributes |= attributes
         records.attributes["wall_seconds"] = time.perf_counter() - self.started
         if self.verdict is not None and records.attributes["complete"]:
             records.attributes["reached_error"] = self.verdict.error
         records.warnings += [*self.remarks, *(r for r in remarks if r)]
         return to_dataset(self.plan.model, records)
+
+    def salvaged(self, error: InputError | MemoryError, *remarks: str) -> InputError:
+        """Return an error found late in a run with what was computed before, which is right."""
+        found = error if isinstance(error, InputError) else OutOfMemoryError(_EXHAUSTED)
+        # no memory even for that: there may be a checkpoint
+        with suppress(MemoryError):
+            found.dataset = self.dataset(*found.problems, *remarks)
+        return found
 
 
 class Threads(Run):
@@ -167,31 +181,38 @@ class Threads(Run):
         self.written = resumed
 
     def finish(self) -> xr.Dataset:
-        """Run to the end, or raise `Interrupted` with what there is."""
-        reason = ""
+        """Run to the end or to the time limit, or raise `Interrupted` with what there is."""
+        begun = False
         try:
             for group in [g for g in self.groups if not g.done][:1]:
                 group.compile()
                 self.compile_seconds = group.compile_seconds
-            reason = self._drive()
+            begun = True
+            if self._drive():
+                return self.dataset(self.unsaved)
         except KeyboardInterrupt:
-            reason = "interrupted"
-        except InputError as error:  # found late in a run: what was computed before is right
-            error.checkpoint = self._save()
-            error.dataset = self.dataset(*error.problems, self.unsaved)
-            raise
-        if reason:
             written = self._save()
-            where = f"; go on from {written}" if written else ""
-            raise Interrupted(
-                f"{reason}{where}{self.unsaved and '; ' + self.unsaved}",
-                self.dataset(self.unsaved),
-                written,
-            )
-        return self.dataset(self.unsaved)
+            words = ["interrupted", f"go on from {written}" if written else "", self.unsaved]
+            message = "; ".join(word for word in words if word)
+            raise Interrupted(message, self.dataset(self.unsaved), written) from None
+        except (InputError, MemoryError) as error:
+            if not begun:
+                raise
+            written = self._save()
+            found = self.salvaged(error, self.unsaved)
+            found.checkpoint = written
+            raise found from None
+        return self._stopped()
 
-    def _drive(self) -> str:
-        """Advance all groups; return why it stopped early, or nothing."""
+    def _stopped(self) -> xr.Dataset:
+        """Return what there is at the time limit, and say how to go on."""
+        written, reason = self._save(), f"the time limit of {self.limit:g} s is reached"
+        where = f"; go on with smolux.resume({str(written)!r})" if written else ""
+        file = {"checkpoint": str(written)} if written else {}
+        return self.dataset(f"{reason}{where}", self.unsaved, stopped=reason, **file)
+
+    def _drive(self) -> bool:
+        """Advance all groups; return whether that was to the end."""
         pool = self.executor or ThreadPoolExecutor(self.workers)
         try:
             while True:
@@ -199,11 +220,11 @@ class Threads(Run):
                 if all(g.done for g in self.groups):
                     parts = self.more()
                     if not parts:
-                        return ""
+                        return True
                     self.groups += [start(self.plan, *part) for part in parts]
                 now = time.perf_counter()
                 if now - self.started > self.limit:
-                    return f"stopped at the time limit of {self.limit:g} s"
+                    return False
                 if now >= self.saved + self.every:
                     self._save()
         finally:
@@ -248,8 +269,10 @@ class Threads(Run):
         try:
             checkpoints.save(self.checkpoint, self.plan, self.groups)
             self.unsaved = ""
-        except (OSError, InputError) as error:  # a full disk must not cost what is computed
-            self.unsaved = f"no checkpoint was written: {error}"
+        except (OSError, InputError, MemoryError) as error:
+            # a full disk must not cost what is computed
+            reason = str(error) or "out of memory"
+            self.unsaved = f"no checkpoint was written: {reason}"
         else:
             self.written = True
         self.saved = time.perf_counter()
@@ -257,13 +280,26 @@ class Threads(Run):
         return self.checkpoint if self.written else None
 
 
-def run_group(plan: Plan, first: int, count: int) -> Group | Divided:
-    """Run a group to its end, in a worker of any executor."""
+#: what a group came to, and the error that ended it
+Outcome = tuple[Group | Divided, InputError | None]
+
+
+def run_group(plan: Plan, first: int, count: int) -> Outcome:
+    """Run a group to its end, in a worker of any executor.
+
+    What was observed is all that goes back; also if an error came late.
+    """
     group = start(plan, first, count)
     group.compile()
-    group.advance(lambda: False)
-    group.release()  # what was observed is all that goes back
-    return group
+    found: InputError | None = None
+    try:
+        group.advance(lambda: False)
+    except InputError as error:
+        found = error
+    except MemoryError:
+        found = OutOfMemoryError(_EXHAUSTED)
+    group.release()
+    return group, found
 
 
 class Elsewhere(Run):
@@ -281,40 +317,74 @@ class Elsewhere(Run):
         self.executor = executor
 
     def finish(self) -> xr.Dataset:
-        """Run to the end, or raise `Interrupted`: what workers have not sent back is lost.
+        """Run to the end, or raise what ended it with what workers have sent back.
 
         Raises
         ------
+        InputError
+            If one was found late in the run; groups that had not begun then are left out.
+        Interrupted
+            On Ctrl-C.
         WorkerError
             If the workers die again and again.
         """
         parts = self.plan.groups(self.workers)
+        found: dict[int, Group | Divided] = {}
         try:
             while parts:
-                found = self._gather(parts)
+                self._gather(parts, found)
                 self.groups += [found[k] for k in range(len(parts))]
+                found.clear()
                 parts = self.more()
+            return self.dataset()
         except KeyboardInterrupt:
-            raise Interrupted("interrupted") from None
-        return self.dataset()
+            raise Interrupted("interrupted", self._kept(parts, found)) from None
+        except WorkerError as error:
+            error.dataset = self._kept(parts, found, str(error))
+            raise
+        except (InputError, MemoryError) as error:
+            self._take_over(parts, found)
+            raise (self.salvaged(error) if self.groups else error) from None
 
-    def _gather(self, parts: list[tuple[int, int]]) -> dict[int, Group | Divided]:
-        found: dict[int, Group | Divided] = {}
+    def _kept(
+        self, parts: list[tuple[int, int]], found: dict[int, Group | Divided], *remarks: str
+    ) -> xr.Dataset | None:
+        """Return what workers have sent back; None if that is nothing."""
+        self._take_over(parts, found)
+        return self.dataset(*remarks) if self.groups else None
+
+    def _take_over(self, parts: list[tuple[int, int]], found: dict[int, Group | Divided]) -> None:
+        """Take the groups that were found, and in place of the others some that never began."""
+        if self.groups or found:
+            self.groups += [
+                found[k] if k in found else Group.unbegun(self.plan, *part)
+                for k, part in enumerate(parts)
+            ]
+
+    def _gather(self, parts: list[tuple[int, int]], found: dict[int, Group | Divided]) -> None:
+        """Run groups; at an error those that have begun are still waited for."""
         tasks = [(self.plan, *part) for part in parts]
+        errors: list[InputError] = []
+
+        def enough() -> bool:
+            return bool(errors)
+
         self._tell(found)
-        for done in completed(self.executor, run_group, tasks, _TICK):
+        for done in completed(self.executor, run_group, tasks, _TICK, enough):
             if done is not None:
                 k, future = done
                 try:
-                    found[k] = future.result()
-                except WorkerError as error:
+                    found[k], error = future.result()
+                except WorkerError as dead:
                     first, count = parts[k]
                     raise WorkerError(
-                        f"replicas {first} to {first + count - 1}: {error}; it may have run out of "
+                        f"replicas {first} to {first + count - 1}: {dead}; it may have run out of "
                         "memory: use fewer workers or particles"
                     ) from None
+                errors += [error] if error is not None else []
             self._tell(found)
-        return found
+        if errors:
+            raise errors[0]
 
     def _tell(self, found: dict[int, Group | Divided]) -> None:
         groups = [*self.groups, *found.values()]

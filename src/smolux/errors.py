@@ -34,12 +34,19 @@ class InputError(ValueError):
         return type(self), (self.problems,)
 
 
+class OutOfMemoryError(InputError):
+    """The arrays of a run would outgrow the memory that there is: it stopped before they did.
+
+    With more memory it goes on from its checkpoint.
+    """
+
+
 class Interrupted(KeyboardInterrupt):
     """A run stopped on request before its end.
 
     Attributes
     ----------
-    dataset : xarray.Dataset
+    dataset : xarray.Dataset or None
         What was computed; output times not reached are NaN.
     checkpoint : pathlib.Path or None
         The file from which the run goes on, bit for bit; None if it could not be written.
@@ -52,7 +59,15 @@ class Interrupted(KeyboardInterrupt):
 
 
 class WorkerError(RuntimeError):
-    """The processes that compute die, again and again: no memory, a crash, a node that is gone."""
+    """The processes that compute die, again and again: no memory, a crash, a node that is gone.
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset or None
+        What the others have computed; replicas of which nothing is known are NaN.
+    """
+
+    dataset: object = None
 
 
 class SmoluxWarning(UserWarning):

@@ -50,7 +50,11 @@ def workers_of(executor: Executor) -> int:
 
 
 def completed(
-    executor: Executor, call: Callable[..., Any], tasks: Sequence[tuple[Any, ...]], tick: float
+    executor: Executor,
+    call: Callable[..., Any],
+    tasks: Sequence[tuple[Any, ...]],
+    tick: float,
+    enough: Callable[[], bool] = lambda: False,
 ) -> Iterator[tuple[int, Future[Any]] | None]:
     """Run tasks, those whose worker dies again; yield each when it is done.
 
@@ -66,6 +70,8 @@ def completed(
         The arguments of each.
     tick : float
         Seconds after which None is yielded, if nothing was done meanwhile.
+    enough : callable
+        If it says so, tasks that have not begun are left out.
 
     Yields
     ------
@@ -75,12 +81,12 @@ def completed(
     left = dict(enumerate(tasks))
     pool, deaths = executor, 0
     try:
-        while left:
+        while left and not enough():
             before = len(left)
             alone = deaths > RETRIES
             batch = dict([next(iter(left.items()))]) if alone else left
             lost: BaseException | None = None
-            for found in _round(pool, call, dict(batch), tick):
+            for found in _round(pool, call, dict(batch), tick, enough):
                 if found is None:
                     yield None
                 elif _died(found[1]):
@@ -103,7 +109,11 @@ def completed(
 
 
 def _round(
-    pool: Executor, call: Callable[..., Any], tasks: dict[int, tuple[Any, ...]], tick: float
+    pool: Executor,
+    call: Callable[..., Any],
+    tasks: dict[int, tuple[Any, ...]],
+    tick: float,
+    enough: Callable[[], bool],
 ) -> Iterator[tuple[int, Future[Any]] | None]:
     """Submit tasks once and yield them as they end, with a worker lost or not."""
     futures: dict[Future[Any], int] = {}
@@ -119,6 +129,8 @@ def _round(
                 yield None
             for future in ended:
                 yield futures.pop(future), future
+            if enough():
+                futures = {future: k for future, k in futures.items() if not future.cancel()}
     finally:
         for future in futures:
             future.cancel()

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from . import room
 from .assembly import (
     bound_splits,
     factor_parameters,
@@ -34,6 +35,7 @@ from .core.state import (
     EXCESS,
     EXTINCT,
     GROW,
+    PARTICLES,
     PAUSE,
     PAUSED,
     PENDING,
@@ -57,6 +59,7 @@ from .core.state import (
 )
 from .errors import InputError
 from .initial import Sizes
+from .methods.base import size_of
 from .model import Model
 from .plan import Plan
 from .processes.base import LoneProcess
@@ -66,8 +69,6 @@ Int = NDArray[np.int64]
 
 #: seconds between returns to Python
 _SLICE = 0.1
-#: what a replica returns with that may end the run
-_ENDING = (BAD_FACTOR, BAD_RATE, TOO_LARGE)
 
 
 @dataclass
@@ -137,6 +138,13 @@ class Group:
             parameters=parameters,
         )
 
+    @classmethod
+    def unbegun(cls, plan: Plan, first: int, count: int) -> Group:
+        """Return a group of which nothing is known, in place of one that never came back."""
+        state = empty_state(plan, np.zeros((count, 4), np.uint64))
+        windows = windows_for(plan.model.processes, plan.times[-1], plan.weighting)
+        return cls.of(plan, first, state, None, windows)
+
     @property
     def done(self) -> bool:
         """Whether every output time of every replica is recorded."""
@@ -152,6 +160,11 @@ class Group:
         """Share of the simulated time that is done."""
         reached = np.minimum(self.state.clock[:, TIME] / self.plan.times[-1], 1.0)
         return float(np.where(self.codes == DONE, 1.0, reached).mean())
+
+    @property
+    def intact(self) -> bool:
+        """Whether it could go on from what it is, see `smolux.subvolumes.Divided`."""
+        return True
 
     def compile(self) -> None:
         """Compile the loop, or load it from the cache, before any clock runs."""
@@ -186,6 +199,7 @@ class Group:
 
         Every call gets something done, so that a run interrupted again and again comes to its end.
         """
+        self._serve()  # what memory did not last for when the run was written
         while not self.done:
             before, budget = self._effort(), self.budget
             start = time.perf_counter()
@@ -203,43 +217,70 @@ class Group:
                 return
 
     def release(self) -> None:
-        """Give up the particles of replicas that are done; what was observed stays."""
-        if self.done:
-            empty = {k: v[:0].copy() for k, v in self.work._asdict().items() if np.ndim(v)}
-            self.work = self.work._replace(**empty)
+        """Give up the particles of replicas that do not go on; what was observed stays."""
+        empty = {k: v[:0].copy() for k, v in self.work._asdict().items() if np.ndim(v)}
+        self.work = self.work._replace(**empty)
 
     def _effort(self) -> int:
         return int(self.state.count[:, (TRIALS, EVENTS)].sum())
 
     def _serve(self) -> None:
-        """Give the replicas that returned what they asked for."""
+        """Give the replicas that returned what they asked for.
+
+        An error comes last: the others have what they asked for when the run is written.
+        """
+        errors: list[InputError] = []
+        waiting = (self.codes != DONE) & (self.codes != BUDGET) & (self.codes != GROW)
+        for r in map(int, np.flatnonzero(waiting)):
+            try:
+                self._give(r)
+            except InputError as error:
+                errors.append(error)
         if (self.codes == GROW).any():
-            self.work = self.plan.method.grow(self.work, self.state)
-        waiting = np.flatnonzero(
-            (self.codes != DONE) & (self.codes != BUDGET) & (self.codes != GROW)
-        )
-        if len(waiting):
-            rates = rates_for(self.plan.model, self.plan.weighting)
-        # an error comes last: the others have what they asked for when the run is written
-        for r in map(int, sorted(waiting, key=lambda r: self.codes[r] in _ENDING)):
-            code = self.codes[r]
-            if code == BOUND:
-                self.plan.method.supply_bound(self.work, rates, self.state, r)
-            elif code == SPLITS:
-                assert self.parameters is not None
-                wanted = int(self.state.count[r, WANTED])
-                bound_splits(self.plan.model.processes, self.parameters, wanted)
-            elif code == PAUSED:
-                self.distribution[r].append(self.plan.method.population(self.work, self.state, r))
-            elif code == BAD_FACTOR:
-                self._repair_factor(r)
-            elif code == BAD_RATE:
-                raise InputError(_bad_rate(self.plan.model, self.state, r))
-            elif code == TOO_LARGE:
-                raise InputError(
-                    "a cluster would reach 2**62 monomers, more than can be counted, near "
-                    f"t = {self.state.clock[r, TIME]:.6g}: end earlier"
-                )
+            try:
+                self._grow()
+            except InputError as error:
+                errors.append(error)
+        if errors:
+            raise errors[0]
+
+    def _give(self, r: int) -> None:
+        """Give a replica what it asked for, or raise the error of it."""
+        code, plan = self.codes[r], self.plan
+        if code == PAUSED:
+            # sizes and counts, and as much to sort them; a store may hold less, if it counts
+            size = min(32 * int(self.state.count[r, PARTICLES]), 4 * size_of(self.work))
+            with room.needed(size, f"the clusters of replica {self.first + r}, to be kept,"):
+                self.distribution[r].append(plan.method.population(self.work, self.state, r))
+        # whatever comes of it, it is asked for anew; but not a population, or it would come twice
+        self.codes[r] = BUDGET
+        if code == BOUND:
+            rates = rates_for(plan.model, plan.weighting)
+            plan.method.supply_bound(self.work, rates, self.state, r)
+        elif code == SPLITS:
+            assert self.parameters is not None
+            bound_splits(plan.model.processes, self.parameters, int(self.state.count[r, WANTED]))
+        elif code == BAD_FACTOR:
+            self._repair_factor(r)
+        elif code == BAD_RATE:
+            raise InputError(_bad_rate(plan.model, self.state, r))
+        elif code == TOO_LARGE:
+            raise InputError(
+                "a cluster would reach 2**62 monomers, more than can be counted, near "
+                f"t = {self.state.clock[r, TIME]:.6g}: end earlier"
+            )
+
+    def _grow(self) -> None:
+        """Make the store larger, if there is memory for that."""
+        method, before = self.plan.method, size_of(self.work)
+        last = self.first + len(self.codes) - 1
+        which = f"replicas {self.first} to {last}" if last > self.first else f"replica {last}"
+        time_ = self.state.clock[self.codes == GROW, TIME].max()
+        what = f"the particles of {which}, more and more until t = {time_:.6g},"
+        with room.needed(method.growth(self.work, self.state), what):
+            self.work = method.grow(self.work, self.state)
+            room.grown(self, size_of(self.work) - before)
+        self.codes[self.codes == GROW] = BUDGET
 
     def _repair_factor(self, r: int) -> None:
         """Raise the bounds of a factor that was found above one; the event itself takes place."""

@@ -28,6 +28,24 @@ def available_memory(root: Path = _ROOT) -> float | None:
     return min(known) if known else None
 
 
+def free_memory(root: Path = _ROOT) -> float | None:
+    """Bytes that this process may take besides those that it has; None if nothing is known.
+
+    Of the machine, of every control group above, and below the limit of addresses; what files keep
+    in memory is free. `root` as for `available_memory`.
+    """
+    found = [_free_on_the_machine(root), _address_space(root)]
+    found += [_free_in_group(file) for file in _files(root, "memory", _MEMORY)]
+    known = [x for x in found if x is not None]
+    return max(min(known), 0.0) if known else None
+
+
+def resident_memory(root: Path = _ROOT) -> float:
+    """Bytes of memory that this process has in use, 0 if that is not known."""
+    pages = _text(root / "proc/self/statm").split()
+    return float(int(pages[1]) * os.sysconf("SC_PAGE_SIZE")) if len(pages) > 1 else 0.0
+
+
 def cores(root: Path = _ROOT) -> int:
     """Cores that this process may use, at least one; `root` as for `available_memory`."""
     if hasattr(os, "sched_getaffinity"):
@@ -41,6 +59,11 @@ def cores(root: Path = _ROOT) -> int:
 
 #: files of control groups of version 2 and 1
 _MEMORY = ("memory.max", "memory.limit_in_bytes")
+#: beside them: what the group has, and the line of memory.stat with what files keep
+_USED = {
+    _MEMORY[0]: ("memory.current", "inactive_file"),
+    _MEMORY[1]: ("memory.usage_in_bytes", "total_inactive_file"),
+}
 _CPU = ("cpu.max", "cpu.cfs_quota_us")
 
 
@@ -49,6 +72,30 @@ def _installed() -> float | None:
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, ValueError, OSError):  # not known on this system
         return None
+
+
+def _free_on_the_machine(root: Path) -> float | None:
+    kilobytes = _line(root / "proc/meminfo", "MemAvailable:")
+    return _installed() if kilobytes is None else 1024.0 * kilobytes
+
+
+def _free_in_group(file: Path) -> float | None:
+    """Bytes below the limit of a control group that nothing needs."""
+    limit = _number(file)
+    current, reclaimable = _USED[file.name]
+    used = _number(file.with_name(current))
+    if limit is None or used is None:
+        return limit
+    return limit - used + (_line(file.with_name("memory.stat"), reclaimable) or 0.0)
+
+
+def _line(file: Path, name: str) -> float | None:
+    """Read the number of a line that begins with a name."""
+    for line in _text(file).splitlines():
+        words = line.split()
+        if words[:1] == [name]:
+            return float(words[1])
+    return None
 
 
 def _address_space(root: Path) -> float | None:

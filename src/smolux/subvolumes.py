@@ -9,13 +9,14 @@ sub-volumes with probability ``1/p``, and meet there ``p`` times as often.
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from . import room
 from .assembly import rates_for
 from .core.rng import stream
 from .core.state import (
@@ -44,7 +45,7 @@ from .core.state import (
     Windows,
     new_tally,
 )
-from .methods.base import merged
+from .methods.base import merged, size_of
 from .plan import LEAST, Plan
 from .processes.base import PairProcess
 from .replicas import Group, empty_state, initial_populations
@@ -79,6 +80,8 @@ class Divided:
     bounds_seconds: float = 0.0
     #: the sub-volumes at the end of a stretch, or while it lasts
     parts: list[Group] = field(default_factory=list)
+    #: the times of a stretch that has begun and is not yet over
+    open: tuple[float, ...] = ()
 
     @classmethod
     def start(cls, plan: Plan, replica: int) -> Divided:
@@ -108,7 +111,9 @@ class Divided:
     @property
     def events(self) -> int:
         """Collisions so far."""
-        return int(self.state.count[0, EVENTS]) + sum(part.events for part in self.parts)
+        # those of a stretch that is over are added up
+        here = sum(part.events for part in self.parts) if self.open else 0
+        return int(self.state.count[0, EVENTS]) + here
 
     @property
     def fraction(self) -> float:
@@ -128,25 +133,43 @@ class Divided:
                 if stop():
                     return
 
+    @property
+    def intact(self) -> bool:
+        """Whether it could go on: not if memory ended while the particles were dealt out."""
+        return bool(self.parts) or self.done
+
     def release(self) -> None:
-        """Give up the particles when done; what was observed stays."""
-        if self.done:
-            self.parts.clear()
+        """Give up the particles of a replica that does not go on; what was observed stays."""
+        self.parts.clear()
 
     def _stretch(self, pool: ThreadPoolExecutor) -> None:
-        """Mix, and simulate all sub-volumes up to the next mixing."""
+        """Mix, and simulate all sub-volumes up to the next mixing; or go on doing so."""
+        if not self.open:
+            self._mix(pool)
+        begun = [pool.submit(part.advance, lambda: False) for part in self.parts]
+        # all come to the end of the stretch, so that one that fails leaves the others complete
+        wait(begun)
+        for each in begun:
+            each.result()
+        left = np.array(self.plan.times[int(self.state.count[0, NEXT]) :])
+        self._observe(int((left <= self.open[-1]).sum()))
+        self._add_up(self.open[-1])
+        self.open = ()
+
+    def _mix(self, pool: ThreadPoolExecutor) -> None:
+        """Put the particles into sub-volumes at random, for the next stretch."""
         clock, count = self.state.clock[0], self.state.count[0]
         start, end = clock[TIME], clock[TIME] + self.length
         left = self.plan.times[int(count[NEXT]) :]
         due = [t for t in left if t <= end]
         if len(due) == len(left):
             end = due[-1]
-        times = due if due and due[-1] == end else [*due, end]
-        plan = replace(
-            self.plan, times=tuple(times), population="fixed-volume", subvolumes=1, replicas=1
-        )
-        copies = self._doubling()
-        used = max(1, min(self.plan.subvolumes, int(count[PARTICLES]) // LEAST))
+        times = tuple(due if due and due[-1] == end else [*due, end])
+        plan = within(self.plan, times)
+        copies = self._copies()
+        size = sum(copies * size_of(part.work) for part in self.parts)
+        what = f"the sub-volumes of replica {self.first}, dealt out anew at t = {start:.6g},"
+        used = max(1, min(self.plan.subvolumes, copies * int(count[PARTICLES]) // LEAST))
         method, rates = plan.method, rates_for(plan.model, plan.weighting)
         learnt = [method.learnt(part.work, part.state) for part in self.parts]
         window = int(np.searchsorted(self.windows.edges, start, side="right")) - 1
@@ -168,25 +191,29 @@ class Divided:
             known = parameters[k] if k < len(parameters) else None
             return Group.of(plan, self.first, state, work, self.windows, loop, known)
 
-        piles = list(pool.map(split, range(len(self.parts))))
-        self.parts.clear()  # room for what follows
-        self.parts += pool.map(fill, range(used))
-        piles.clear()
-        list(pool.map(lambda part: part.advance(lambda: False), self.parts))
-        self._observe(len(due))
-        self._add_up(end)
+        with room.needed(size, what):
+            piles = list(pool.map(split, range(len(self.parts))))
+            self._double(copies)
+            self.parts.clear()  # room for what follows
+            filled = list(pool.map(fill, range(used)))
+        self.parts += filled
+        self.open = times
 
-    def _doubling(self) -> int:
-        """Double the volume as often as the policy says; return how often each particle comes."""
-        clock, count = self.state.clock[0], self.state.count[0]
-        copies = 1
-        while 0 < count[PARTICLES] <= self.plan.doubles_at:
+    def _copies(self) -> int:
+        """Return how often each particle comes when the volume is doubled as the policy says."""
+        copies, particles = 1, int(self.state.count[0, PARTICLES])
+        while 0 < copies * particles <= self.plan.doubles_at:
             copies *= 2
-            count[PARTICLES] *= 2
-            count[DOUBLINGS] += 1
-            clock[[VOLUME, MASS_IN, MASS_OUT]] *= 2.0
-            clock[EXTINCT] = np.nan
         return copies
+
+    def _double(self, copies: int) -> None:
+        """Make the volume so many times as large."""
+        clock, count = self.state.clock[0], self.state.count[0]
+        count[PARTICLES] *= copies
+        count[DOUBLINGS] += copies.bit_length() - 1
+        clock[[VOLUME, MASS_IN, MASS_OUT]] *= float(copies)
+        if copies > 1:
+            clock[EXTINCT] = np.nan
 
     def _observe(self, due: int) -> None:
         """Add up what the sub-volumes recorded at the output times of this stretch."""
@@ -233,6 +260,11 @@ class Divided:
             self.length = min(self.length, wanted * elapsed)
         if count[NEXT] == len(self.plan.times):
             self.codes[0] = DONE
+
+
+def within(plan: Plan, times: tuple[float, ...]) -> Plan:
+    """Return the plan of a sub-volume for a stretch with these times."""
+    return replace(plan, times=times, population="fixed-volume", subvolumes=1, replicas=1)
 
 
 def _first_stretch(plan: Plan, replica: int) -> float:

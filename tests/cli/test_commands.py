@@ -339,7 +339,7 @@ def test_a_full_disk_leaves_the_results_somewhere(folder, monkeypatch):
 
     monkeypatch.setattr(running.results, "save", full)
     stderr = call("run", "small.toml", code=3).stderr
-    assert "go on with: smolux run small" in stderr
+    assert "begin again with: smolux run small" in stderr  # there is no checkpoint
     kept = stderr.split("what was computed is in ")[1].split("\n")[0]
     assert smolux.results.load(kept).attrs["seed"] == "7"
     monkeypatch.undo()

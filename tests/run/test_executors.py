@@ -6,17 +6,40 @@ import os
 import shutil
 import subprocess
 import sys
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import (
+    BrokenExecutor,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+)
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import runs
 
 import smolux as sx
-from smolux import driving, executors, stochastic
+from smolux import driving, executors, replicas, stochastic
 from smolux.errors import InputError, Interrupted, WorkerError
 from smolux.executors import RETRIES, completed, opened
+
+
+class InThisProcess(Executor):
+    """Runs tasks when they are submitted, but is no pool of threads."""
+
+    _max_workers = 2
+
+    def submit(self, call: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(call(*arguments, **named))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
 
 SETTINGS: dict[str, Any] = {
     "particles": 150, "replicas": 5, "seed": 5, "sizes": 40, "orders": (0, 1, 2),
@@ -152,8 +175,64 @@ def test_ctrl_c() -> None:
     def press(progress: Any) -> None:
         raise KeyboardInterrupt
 
-    with ProcessPoolExecutor(1) as pool, pytest.raises(Interrupted):
+    with ProcessPoolExecutor(1) as pool, pytest.raises(Interrupted) as caught:
         simulate(executor=pool, progress=press)
+    assert caught.value.dataset is None  # nothing had come back
+
+
+def test_ctrl_c_keeps_what_came_back(expected: Any) -> None:
+    def press(progress: Any) -> None:
+        if progress.fraction > 0:
+            raise KeyboardInterrupt
+
+    with InThisProcess() as pool, pytest.raises(Interrupted) as caught:
+        simulate(executor=pool, progress=press)
+    ds: Any = caught.value.dataset
+    assert not ds.attrs["complete"]
+    assert ds.sizes["replica"] == 5
+    came = np.isfinite(ds["n"].values).all(axis=(1, 2))
+    assert came.any()
+    np.testing.assert_array_equal(ds["n"].values[came], expected["n"].values[came])
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the error is put into forked processes")
+@pytest.mark.parametrize("kind", [InputError, MemoryError])
+def test_a_late_error_keeps_what_others_computed(kind: Any, monkeypatch: Any) -> None:
+    serve, given = replicas.Group._serve, {"particles": 20_000, "replicas": 4}
+    expected = simulate(**given)
+
+    def late(group: Any) -> None:
+        serve(group)
+        if group.first > 0 and group.fraction > 0.2:
+            raise kind("a rate is nan; it must be a finite number")
+
+    monkeypatch.setattr(replicas.Group, "_serve", late)
+    with ProcessPoolExecutor(2, get_context("fork")) as pool, pytest.raises(InputError) as caught:
+        simulate(executor=pool, **given)
+    assert ("finite number" if kind is InputError else "memory") in str(caught.value)
+    ds: Any = caught.value.dataset
+    assert not ds.attrs["complete"]
+    assert caught.value.problems[0] in ds.attrs["warnings"]
+    whole = np.isfinite(ds["n"].values).all(axis=(1, 2))
+    assert whole[0]
+    assert not whole[-1]
+    np.testing.assert_array_equal(ds["n"].values[whole], expected["n"].values[whole])
+
+
+def test_workers_that_die_leave_what_others_computed(expected: Any, monkeypatch: Any) -> None:
+    group = driving.run_group
+
+    def deadly(plan: Any, first: int, count: int) -> Any:
+        if first == 0:
+            return group(plan, first, count)
+        raise BrokenExecutor("gone")
+
+    monkeypatch.setattr(driving, "run_group", deadly)
+    with InThisProcess() as pool, pytest.raises(WorkerError) as caught:
+        simulate(executor=pool)
+    ds: Any = caught.value.dataset
+    np.testing.assert_array_equal(ds["n"].values[:1], expected["n"].values[:1])
+    assert np.isnan(ds["n"].values[-1]).all()
 
 
 # --- executors by name ---------------------------------------------------------------------------

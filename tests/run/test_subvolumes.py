@@ -13,9 +13,12 @@ import runs
 
 import smolux as sx
 from shared import VARYING
-from smolux import plan, subvolumes
-from smolux.errors import InputError, Interrupted
+from smolux import plan, resources, room, subvolumes
+from smolux.core.state import TIME
+from smolux.errors import InputError
 from smolux.exact import finite
+from smolux.replicas import Group
+from smolux.subvolumes import Divided
 
 SETTINGS: dict[str, Any] = {"particles": 4000, "replicas": 2, "seed": 3, "sizes": 40}
 TIMES = [0.0, 0.5, 2.0]
@@ -31,6 +34,8 @@ def test_the_same_physics(method: str) -> None:
     ds = simulate(method, replicas=8)
     whole = simulate(method, replicas=8, subvolumes=1)
     assert ds.attrs["subvolumes"] == 2
+    # at the last output time
+    assert ds.attrs["events"] == ds["collisions"].isel(time=-1).sum()
     np.testing.assert_array_equal(ds["moment"].sel(order=1), 1.4)
     assert (ds["particles"] / ds["volume"] == ds["number_density"]).all()
     for order in (0, 2):
@@ -55,18 +60,53 @@ def test_neither_output_times_nor_threads_matter() -> None:
 def test_goes_on_from_a_checkpoint(distribution: bool, tmp_path: Path) -> None:
     expected = simulate(distribution=distribution)
     path = tmp_path / "run.npz"
-    with pytest.raises(Interrupted):
-        simulate(checkpoint=path, time_limit=1e-9, distribution=distribution)
+    ds = simulate(checkpoint=path, time_limit=1e-9, distribution=distribution)
+    assert not ds.attrs["complete"]
     for _stops in range(1000):
-        try:
-            ds = sx.resume(path, time_limit=1e-9)
+        ds = sx.resume(path, time_limit=1e-9)
+        if ds.attrs["complete"]:
             break
-        except Interrupted:
-            continue
     runs.assert_same(expected, ds)
     assert json.loads(ds.attrs["warnings"]) == []
     if distribution:
         assert ds["sample_count"].sum() == ds["particles"].sum()
+
+
+@pytest.mark.parametrize("kind", ["error", "memory"])
+def test_a_late_error_goes_on_in_the_middle_of_a_stretch(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected, path, left = simulate(distribution=True), tmp_path / "run.npz", [6]
+    serve, free = Group._serve, resources.free_memory
+
+    def late(group: Any) -> None:
+        serve(group)
+        if group.state.clock[0, TIME] > 0.7 and group.done:
+            left[0] -= 1
+            if left[0] <= 0:
+                raise InputError("a rate is nan; it must be a finite number")
+
+    with monkeypatch.context() as patch:
+        if kind == "error":
+            patch.setattr(Group, "_serve", late)
+        else:
+            patch.setattr(room, "_SMALL", 0)
+            patch.setattr(resources, "free_memory", lambda: (free() or 1e9) if left[0] else 0.0)
+            mix = Divided._mix
+
+            def fewer(divided: Any, pool: Any) -> None:
+                left[0] -= divided.state.clock[0, TIME] > 0.7 and left[0] > 0
+                mix(divided, pool)
+
+            patch.setattr(Divided, "_mix", fewer)
+        with pytest.raises(InputError, match=r"finite number|memory: .* are free") as caught:
+            simulate(checkpoint=path, distribution=True)
+    assert caught.value.checkpoint == path
+    ds: Any = caught.value.dataset
+    assert np.isfinite(ds["n"].values[0, 1]).all()
+    assert np.isnan(ds["n"].values[:, 2]).any()
+    assert not ds.attrs["complete"]
+    runs.assert_same(expected, sx.resume(path))
 
 
 def _clusters(remix: float) -> np.ndarray:

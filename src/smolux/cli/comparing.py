@@ -14,7 +14,7 @@ from .. import analysis
 from ..case import Case
 from ..deterministic import SolverError
 from ..deterministic.solver import solve
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, Interrupted, did_you_mean
 from ..methods import METHODS
 from . import console
 from .progress import Display
@@ -73,6 +73,11 @@ def compute(
         As `choose` returns them.
     display : callable
         Makes the display of progress.
+
+    Raises
+    ------
+    Interrupted
+        At the time limit.
     """
     found = []
     for number, name in enumerate(methods):
@@ -95,6 +100,8 @@ def _simulated(case: Case, name: str, number: int, progress: Display) -> Compute
     assert run.seed is not None
     settings = replace(run, method=name, seed=run.seed + number).arguments()
     ds = smolux.simulate(case.model, **settings, time_limit=run.time_limit, progress=progress)
+    if not ds.attrs["complete"]:
+        raise Interrupted(f"{name}: {ds.attrs['stopped']}: raise run.time_limit, or leave it out")
     compiling = float(ds.attrs["compile_seconds"])
     wall = float(ds.attrs["wall_seconds"]) - compiling
     return Computed(name, ds, wall, compiling, float(ds.attrs["events"]))

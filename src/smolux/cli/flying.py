@@ -41,7 +41,7 @@ def run(case: SpatialCase, path: Path, output: Path | None) -> None:
         directory = rundir.create(case, path, output)
     say(f"seed {case.run.seed}, folder {directory.path}")
     tree = _stored(directory, case)
-    if tree is None or tree.attrs.get("stopped") == "interrupted":
+    if tree is None or _cut(tree):
         tree = _simulate(case, directory, tree)
     typer.echo(text(tree))
     for remark in _write_output(case, tree, directory.path):
@@ -66,6 +66,7 @@ def _simulate(case: SpatialCase, directory: RunDirectory, before: Any) -> Any:
     """Run to the end, from what was reached before if the method can go on from there."""
     arguments = case.run.arguments()
     exact = arguments["method"].exact
+    tree: Any
     if before is None or not exact:
         begun = partial(spatial.simulate, case.run.system())
     else:
@@ -77,14 +78,23 @@ def _simulate(case: SpatialCase, directory: RunDirectory, before: Any) -> Any:
         try:
             tree = begun(progress=progress, **arguments)
         except Interrupted as stop:
-            _store(stop.dataset, case, directory)
-            raise Interrupted(
-                f"{stop}; what was reached is in {directory.results}\n"
-                f"{'go on' if exact else 'begin again'} with: smolux run {directory.path}"
-            ) from None
+            tree, reason = stop.dataset, str(stop)
+        else:
+            reason = tree.attrs["stopped"]
     _store(tree, case, directory)
+    if _cut(tree):
+        raise Interrupted(
+            f"{reason}; what was reached is in {directory.results}\n"
+            f"{'go on' if exact else 'begin again'} with: smolux run {directory.path}"
+        )
     say(f"simulated in {duration(float(tree.attrs['wall_seconds']))}")
     return tree
+
+
+def _cut(tree: Any) -> bool:
+    """Whether a run was stopped by what is no part of the case: the user, the clock, memory."""
+    reason = str(tree.attrs.get("stopped", ""))
+    return reason.startswith(("interrupted", "the time limit", "memory"))
 
 
 def _store(tree: Any, case: SpatialCase, directory: RunDirectory) -> None:

@@ -8,6 +8,7 @@ import os
 import tempfile
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from .. import results
 from ..case import Case, parse
 from ..deterministic import SolverError
 from ..deterministic.solver import solve
-from ..errors import InputError, Interrupted, SmoluxWarning, WorkerError
+from ..errors import InputError, Interrupted, OutOfMemoryError, SmoluxWarning, WorkerError
 from ..executors import opened
 from ..model_dict import model_to_dict
 from . import figures, report
@@ -79,7 +80,9 @@ def proceed(directory: RunDirectory, display: Callable[..., Display] = Display) 
             return _stages(case, directory, stopper, display)
         except KeyboardInterrupt as stop:
             reason = str(stop) if isinstance(stop, Interrupted) else "stopped"
-            raise Interrupted(f"{reason}\ngo on with: smolux run {directory.path}") from None
+            raise Interrupted(f"{reason}\n{_onward(directory)}") from None
+        except OutOfMemoryError as error:
+            raise Interrupted(f"error: {error}\n{_onward(directory)}") from None
         except WorkerError as error:
             raise Interrupted(
                 f"error: {error}\ntry again with: smolux run {directory.path}"
@@ -88,9 +91,17 @@ def proceed(directory: RunDirectory, display: Callable[..., Display] = Display) 
             if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS):
                 raise
             raise Interrupted(
-                f"error: {error.strerror or error}\n"
-                f"when there is room, go on with: smolux run {directory.path}"
+                f"error: {error.strerror or error}\nwhen there is room, {_onward(directory)}"
             ) from error
+
+
+def _onward(directory: RunDirectory) -> str:
+    """Say how to go on: from the start, if nothing is there to go on from."""
+    kept = directory.checkpoint.is_file()
+    if not kept and directory.results.is_file():
+        with suppress(InputError):  # what is whole is not computed again
+            kept = bool(results.load(directory.results).attrs.get("complete", 1))
+    return f"{'go on' if kept else 'begin again'} with: smolux run {directory.path}"
 
 
 def _stages(
@@ -196,21 +207,19 @@ def _simulate(
     with display(check=check) as progress:
         try:
             ds = _computed(case, directory, progress)
-        except Interrupted as stop:
+        except (Interrupted, InputError, WorkerError) as stop:
             stopper.patient = True
-            if stop.dataset is None:  # it ran elsewhere
-                raise Interrupted(
-                    "stopped; nothing is kept of a run that is not on threads"
-                ) from None
-            _store(stop.dataset, case, directory.results)
-            share = f", {100 * progress.last.fraction:.0f} % done" if progress.last else ""
-            raise Interrupted(f"{str(stop).partition(';')[0]}{share}") from None
-        except InputError as error:
-            if error.dataset is not None:  # a rate was no number, late in the run
-                _store(error.dataset, case, directory.results)
-            raise
+            if stop.dataset is not None:  # what there was until then is right
+                _store(stop.dataset, case, directory.results)
+            if not isinstance(stop, Interrupted):
+                if stop.dataset is not None:
+                    say(f"what was computed until then is in {directory.results}")
+                raise
+            raise Interrupted(f"{str(stop).partition(';')[0]}{_share(progress)}") from None
         stopper.patient = True
     _store(ds, case, directory.results)
+    if not ds.attrs["complete"]:
+        raise Interrupted(f"{ds.attrs['stopped']}{_share(progress)}")
     # not before: whatever happens between, the run can go on from it
     directory.checkpoint.unlink(missing_ok=True)
     say(
@@ -226,6 +235,10 @@ def _simulate(
     stopper.patient = False
     stopper.check()
     return ds
+
+
+def _share(progress: Display) -> str:
+    return f", {100 * progress.last.fraction:.0f} % done" if progress.last else ""
 
 
 def _computed(case: Case, directory: RunDirectory, progress: Display) -> Any:

@@ -92,8 +92,12 @@ class Method:
         raise NotImplementedError
 
     def grow(self, work: Any, state: State) -> Any:
-        """Return the work arrays with more room."""
+        """Return the work arrays with more room; those given stay as they are if there is none."""
         raise NotImplementedError
+
+    def growth(self, work: Any, state: State) -> int:
+        """Return the bytes of the arrays that `grow` would make, or a little more."""
+        return 2 * size_of(work)
 
     def supply_bound(self, work: Any, rates: Rates, state: State, replica: int) -> None:
         """Compute the bound for which the loop returned `BOUND`."""
@@ -144,6 +148,11 @@ def merged(populations: list[tuple[Int, Int]]) -> tuple[Int, Int]:
     counts = np.zeros(len(sizes), np.int64)
     np.add.at(counts, where, numbers)
     return sizes, counts
+
+
+def size_of(arrays: Any) -> int:
+    """Bytes of the arrays of a named tuple."""
+    return sum(array.nbytes for array in arrays)
 
 
 def enlarged(array: NDArray[Any], capacity: int) -> NDArray[Any]:

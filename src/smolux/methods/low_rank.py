@@ -160,33 +160,34 @@ class LowRank(Method):
         meta = work.meta
         pool = max(int(meta[:, POOL_NEEDED].max()), work.pool.shape[1])
         slots = _padded(int(meta[:, SLOTS_NEEDED].max()))
-        meta[:, (POOL_NEEDED, SLOTS_NEEDED)] = 0
+        wide = bool(state.sizes.max() > meta[0, WIDEST])
+        more = work
         if pool > work.pool.shape[1]:
-            work = work._replace(pool=enlarged(work.pool, pool))
-        if state.sizes.max() > meta[0, WIDEST]:
+            more = more._replace(pool=enlarged(work.pool, pool))
+        if wide:
+            more = more._replace(pool=more.pool.astype(np.int64))
+        if slots > work.number.shape[1]:
+            more = _more_slots(more, slots)
+            # the quanta stay: what other replicas need must not change the course of one
+            meta[:, STAGE] = np.where(meta[:, STAGE] >= 0, -meta[:, STAGE] - 2, meta[:, STAGE])
+        # only now, when all arrays are there
+        meta[:, (POOL_NEEDED, SLOTS_NEEDED)] = 0
+        if wide:
             meta[:, WIDEST] = np.iinfo(np.int64).max
-            work = work._replace(pool=work.pool.astype(np.int64))
-        old = work.number.shape[1]
-        if slots <= old:
-            return work
-        slots = min(max(slots, 2 * old), _padded(work.factor.shape[1]))
-        levels = levels_of(slots)
-        order = enlarged(work.order, slots)
-        order[:, old:] = np.arange(old, slots)
-        start = enlarged(work.start, slots)
-        start[:, old:] = meta[:, TAIL, None]
-        # the quanta stay: what other replicas need must not change the course of one
-        meta[:, STAGE] = np.where(meta[:, STAGE] >= 0, -meta[:, STAGE] - 2, meta[:, STAGE])
-        return work._replace(
-            number=enlarged(work.number, slots),
-            tree=np.zeros((*work.tree.shape[:2], levels[-1] + 1), np.int64),
-            grains=np.zeros((len(meta), slots, work.grains.shape[2])),
-            share=np.zeros((len(meta), slots)),
-            levels=levels,
-            start=start,
-            room=enlarged(work.room, slots),
-            order=order,
-        )
+        return more
+
+    def growth(self, work: Work, state: State) -> int:
+        """See `Method.growth`."""
+        meta, found = work.meta, 0
+        wide = bool(state.sizes.max() > meta[0, WIDEST])
+        pool = max(int(meta[:, POOL_NEEDED].max()), work.pool.shape[1])
+        if wide or pool > work.pool.shape[1]:
+            found += len(meta) * pool * (8 if wide else work.pool.itemsize)
+        slots = _padded(int(meta[:, SLOTS_NEEDED].max()))
+        if slots > work.number.shape[1]:
+            arrays = (getattr(work, name).nbytes for name in _BY_SLOT)
+            found += int(sum(arrays) * max(slots / work.number.shape[1], 2.0))
+        return found
 
     def supply_bound(self, work: Work, rates: Rates, state: State, replica: int) -> None:
         """See `Method.supply_bound`; a majorant for all sizes up to the end of an octave."""
@@ -245,6 +246,31 @@ class FictitiousJumps(LowRank):
     title: ClassVar[str] = "fictitious jumps"
     reference: ClassVar[str] = "A. Eibeck, W. Wagner, SIAM J. Sci. Comput. 22, 802 (2000)"
     single: ClassVar[bool] = True
+
+
+#: arrays with an entry for each slot
+_BY_SLOT = ("number", "tree", "grains", "share", "start", "room", "order")
+
+
+def _more_slots(work: Work, slots: int) -> Work:
+    """Make room for so many slots, and for more of them at a time."""
+    old, meta = work.number.shape[1], work.meta
+    slots = min(max(slots, 2 * old), _padded(work.factor.shape[1]))
+    levels = levels_of(slots)
+    order = enlarged(work.order, slots)
+    order[:, old:] = np.arange(old, slots)
+    start = enlarged(work.start, slots)
+    start[:, old:] = meta[:, TAIL, None]
+    return work._replace(
+        number=enlarged(work.number, slots),
+        tree=np.zeros((*work.tree.shape[:2], levels[-1] + 1), np.int64),
+        grains=np.zeros((len(meta), slots, work.grains.shape[2])),
+        share=np.zeros((len(meta), slots)),
+        levels=levels,
+        start=start,
+        room=enlarged(work.room, slots),
+        order=order,
+    )
 
 
 def _padded(slots: int) -> int:

@@ -12,7 +12,7 @@ from ..core.slots import slot_edges
 from ..core.state import MAJORANT, PARTICLES, SINCE, TIME, State
 from ..errors import InputError
 from . import size_class_pieces as pieces
-from .base import Int, Method, Rates, Words, enlarged, spread
+from .base import Int, Method, Rates, Words, enlarged, size_of, spread
 from .size_class_deal import Pile, collect, split
 from .size_class_state import (
     AHEAD,
@@ -103,17 +103,32 @@ class SizeClass(Method):
         work.before[:] = work.number
         return work
 
+    def _lacks(self, work: Work, state: State) -> tuple[int, bool]:
+        """Return how many classes the sizes to be stored need, and whether wider entries."""
+        size, classes, bits = int(state.sizes.max()), work.number.shape[1], int(work.meta[0, BITS])
+        more = classes + (_OCTAVES << bits) if _class_of(size, bits) >= classes else classes
+        return more, size > work.meta[0, WIDEST]
+
     def grow(self, work: Work, state: State) -> Work:
         """See `Method.grow`; what has no room is found out from the sizes that are to be stored."""
-        size = int(state.sizes.max())
-        classes = work.number.shape[1]
-        bits = int(work.meta[0, BITS])
-        if _class_of(size, bits) >= classes:
-            return _more_classes(work, classes + (_OCTAVES << bits))
-        if size > work.meta[0, WIDEST]:
+        classes, wide = self._lacks(work, state)
+        if classes > work.number.shape[1]:
+            return _more_classes(work, classes)
+        if wide:
+            pool = work.pool.astype(np.int64)
             work.meta[:, WIDEST] = np.iinfo(np.int64).max
-            return work._replace(pool=work.pool.astype(np.int64))
+            return work._replace(pool=pool)
         return _more_chunks(work)
+
+    def growth(self, work: Work, state: State) -> int:
+        """See `Method.growth`."""
+        classes, wide = self._lacks(work, state)
+        if classes > work.number.shape[1]:
+            fixed = work.pool.nbytes + work.free.nbytes
+            return int((size_of(work) - fixed) * (classes / work.number.shape[1]) ** 2)
+        if wide:
+            return 2 * work.pool.nbytes
+        return 2 * (work.pool.nbytes + work.free.nbytes + work.where.nbytes)
 
     def supply_bound(self, work: Work, rates: Rates, state: State, replica: int) -> None:
         """See `Method.supply_bound`; bounds come in fixed blocks of octaves.
@@ -314,13 +329,14 @@ def _more_chunks(work: Work) -> Work:
         left = int(work.meta[r, FREE])
         free[r, old : old + left] = work.free[r, :left]
         free[r, :old] = np.arange(2 * old - 1, old - 1, -1)
-    work.meta[:, FREE] += old
-    return work._replace(
+    more = work._replace(
         free=free,
         # as places beyond the end were taken, so that those drawn ahead are right or found anew
         where=np.pad(work.where, ((0, 0), (0, 0), (0, work.where.shape[2])), mode="edge"),
         pool=enlarged(work.pool, 2 * old << chunk),
     )
+    work.meta[:, FREE] += old
+    return more
 
 
 def _bounds(rates: Rates, edges: Int, g: Int, h: Int, single: int) -> tuple[Any, Any]:

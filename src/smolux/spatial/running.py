@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import is_number, numbers
-from ..errors import InputError, Interrupted, did_you_mean
+from ..errors import InputError, Interrupted, OutOfMemoryError, did_you_mean
+from ..room import needed
 from .ctrlc import CtrlC
 from .method import Run, SpatialMethod
 from .methods import METHODS
@@ -29,6 +30,8 @@ Float = NDArray[np.float64]
 _BUDGET = 1 << 16
 _TIMES = 100
 _TICK = 0.2
+#: bytes that the result needs for each event, besides those of the log
+_EVENT = 100
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,8 @@ def simulate(
 
     Notes
     -----
-    A run that stops before its goal says why, in the attribute ``stopped`` and in its warnings.
+    A run that stops before its goal, at a limit or because memory would not last, says why: its
+    attribute ``complete`` is 0, and ``stopped`` and its warnings hold the reason.
 
     References
     ----------
@@ -212,7 +216,15 @@ class _Driver:
         self.compile_seconds = self.compile_seconds or spent
         if code is None and spent > limit:
             return f"the time limit of {limit:g} s is reached"
-        return code
+        return code or self._short()
+
+    def _short(self) -> str | None:
+        """Say if what has happened leaves too little memory for the result to be made of it."""
+        try:
+            with needed(_EVENT * self.run.events, "what happened so far and the result of it"):
+                return None
+        except OutOfMemoryError as error:
+            return str(error)
 
     def _tell(self) -> None:
         if self.progress is None:
