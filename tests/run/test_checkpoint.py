@@ -15,7 +15,8 @@ import runs
 import smolux as sx
 from shared import QUICK, VARYING
 from smolux import checkpoint as checkpoints
-from smolux import replicas
+from smolux import replicas, resources
+from smolux.core.state import BUDGET, GROW
 from smolux.errors import InputError, Interrupted
 
 TIMES = [0.0, 0.3, 1.0, 2.0]
@@ -114,6 +115,42 @@ def test_a_rate_that_is_no_number_late_keeps_what_was_computed(
         assert np.isfinite(ds["number_density"].values[:, 1]).any()
         assert np.isnan(ds["number_density"].values[:, 3]).any()
     runs.assert_same(simulate(), sx.resume(path))
+
+
+@pytest.mark.parametrize("failure", ["asked for", "refused"])
+@pytest.mark.parametrize("method", runs.METHODS)
+def test_no_memory_to_grow_keeps_what_was_computed(
+    method: str, failure: str, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = {m.name: m for m in sx.methods.METHODS}[method]()
+    kind, given = type(made), {"rate": 0.1, "particles": 6000}
+    expected = simulate(method, **given)
+
+    def growing(group: Any) -> None:
+        if group.fraction > 0.3 and BUDGET in group.codes:
+            group.codes[group.codes == BUDGET] = GROW
+
+    def refuse(*_: Any) -> None:
+        raise MemoryError
+
+    serve = replicas.Group._serve
+    with monkeypatch.context() as patch:
+        # as if the store were full, late in the run
+        patch.setattr(replicas.Group, "_serve", lambda group: (growing(group), serve(group)))
+        patch.setattr(kind, "growth", lambda *_: 1 << 40)
+        patch.setattr(kind, "grow", refuse)
+        if failure == "asked for":
+            patch.setattr(resources, "free_memory", lambda: float(1 << 30))
+        else:
+            patch.setattr(resources, "free_memory", lambda: None)
+        with pytest.raises(InputError, match=r"memory: .* need 1099.51 GB more") as caught:
+            simulate(method, checkpoint=path, **given)
+    assert ("1.01 GB are free" in str(caught.value)) == (failure == "asked for")
+    assert caught.value.checkpoint == path
+    ds: Any = caught.value.dataset
+    assert not ds.attrs["complete"]
+    assert np.isfinite(ds["number_density"].values[:, 1]).any()
+    runs.assert_same(expected, sx.resume(path))
 
 
 def test_a_checkpoint_that_was_not_written_is_not_named(

@@ -82,3 +82,41 @@ def test_a_limit_of_addresses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         resources.resource, "getrlimit", lambda _: (rlimit.RLIM_INFINITY, rlimit.RLIM_INFINITY)
     )
     assert resources._address_space(root) is None
+
+
+MEMINFO = {"proc/meminfo": "MemTotal: 100 kB\nMemAvailable:    7000 kB"}
+
+
+@pytest.mark.parametrize(
+    ("files", "free"),
+    [
+        (MEMINFO, 7000 * 1024),
+        (MEMINFO | {V2[0]: V2[1], f"{GROUP}/job/step/memory.max": "max"}, 7000 * 1024),
+        (
+            {
+                V2[0]: V2[1],
+                f"{GROUP}/job/step/memory.max": "5000",
+                f"{GROUP}/job/step/memory.current": "4000",
+                f"{GROUP}/job/step/memory.stat": "anon 3000\ninactive_file 500\nfile 900",
+            },
+            1500,
+        ),
+        (
+            {
+                V1[0]: V1[1],
+                f"{GROUP}/memory/job/memory.limit_in_bytes": "5000",
+                f"{GROUP}/memory/job/memory.usage_in_bytes": "6000",
+                f"{GROUP}/memory/job/memory.stat": "inactive_file 1\ntotal_inactive_file 200",
+            },
+            0,
+        ),
+    ],
+)
+def test_what_is_free(files: dict[str, str], free: float, tmp_path: Path) -> None:
+    assert resources.free_memory(system(tmp_path, files)) == free
+
+
+def test_what_is_resident(tmp_path: Path) -> None:
+    page = resources.os.sysconf("SC_PAGE_SIZE")
+    root = system(tmp_path, {"proc/self/statm": "1000 10 5 1 0 7 0"})
+    assert resources.resident_memory(root) == 10 * page
