@@ -101,7 +101,8 @@ def simulate(
     checkpoint_every : float
         Seconds between checkpoints.
     time_limit : float, optional
-        Wall seconds after which the run stops as if interrupted.
+        Wall seconds after which the run stops with what was reached: the attribute ``complete`` of
+        the result is then 0, and ``stopped`` and a warning say how to go on.
     target_error : float, optional
         Replicas are added to the first `replicas`, at least 8, until the half width of the 95 %
         interval of the `target` over its mean is at most this at every output time. The result is
@@ -127,14 +128,14 @@ def simulate(
     Raises
     ------
     InputError
-        With every mistake in the arguments, or when the kernel gives no valid rate during the run:
-        then its `dataset` holds what was reached, and its `checkpoint` the file, if one was asked
-        for.
+        With every mistake in the arguments, or when the kernel gives no valid rate during the run,
+        or when the particles would outgrow the memory: then its `dataset` holds what was reached,
+        and its `checkpoint` the file, if one was asked for.
     Interrupted
-        On Ctrl-C, or past the time limit; holds the dataset of what was reached, and the
-        checkpoint from which `resume` goes on, bit for bit, if one was written.
+        On Ctrl-C; holds the dataset of what was reached, and the checkpoint from which `resume`
+        goes on, bit for bit, if one was written.
     WorkerError
-        If processes of an executor die again and again.
+        If processes of an executor die again and again; its `dataset` holds what others computed.
 
     Notes
     -----

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from command import call
 
 import smolux
 from smolux.case import load, parse, spatial
-from smolux.cli import catalogue, templates
+from smolux.cli import catalogue, estimate, templates
+from smolux.errors import InputError, OutOfMemoryError, WorkerError
 from smolux.kernels import KERNELS
 
 SMALL = """\
@@ -365,3 +368,45 @@ def test_a_time_limit_stops_and_goes_on(folder):
     assert not (folder / "cut" / "checkpoint.npz").exists()
     whole, cut = (smolux.results.load(folder / n / "results.nc") for n in ("whole", "cut"))
     assert whole.equals(cut)
+
+
+@pytest.mark.parametrize("kind", [InputError, OutOfMemoryError, WorkerError])
+@pytest.mark.parametrize("written", [False, True])
+def test_an_error_late_in_a_run_keeps_what_was_computed(folder, monkeypatch, kind, written):
+    simulate = smolux.simulate
+
+    def late(*given: object, checkpoint: Path, **settings: object) -> None:
+        error = kind("something is wrong")
+        error.dataset = simulate(*given, **settings)
+        error.dataset.attrs["complete"] = 0
+        if written:
+            checkpoint.write_bytes(b"as if")
+            error.checkpoint = checkpoint
+        raise error
+
+    monkeypatch.setattr(smolux, "simulate", late)
+    found = call("run", "small.toml", code=2 if kind is InputError else 3).stderr
+    assert "error: something is wrong" in found
+    assert "what was computed until then is in small" in found
+    assert not smolux.results.load(folder / "small" / "results.nc").attrs["complete"]
+    # a rate that is no number would be none again
+    onward = {InputError: "", OutOfMemoryError: "go on" if written else "begin again"}
+    assert f"{onward.get(kind, 'try again')} with: smolux run small" in found or kind is InputError
+    assert ("go on" in found) == (written and kind is OutOfMemoryError)
+
+
+def test_compare_says_that_the_time_limit_was_reached(folder):
+    sets = ("-s", "run.particles=8000000", "-s", "run.time_limit=0.01")
+    found = call("compare", "small.toml", "-m", "acceptance-rejection", *sets, code=3).stderr
+    assert "acceptance-rejection: the time limit of 0.01 s is reached" in found
+
+
+def test_check_warns_of_breakage_that_makes_many_particles():
+    text = SMALL + '[initial]\nname = "monodisperse"\nsize = 1000000\n'
+    shattering = '[[processes]]\nname = "shattering"\nrate = 0.1\n'
+    case = parse(text + shattering)
+    (found,) = estimate._breakage(case, replace(case.run, particles=1000))
+    assert "shattering can break the mass up into 1e+09 particles of size 1" in found
+    for text_ in (text, SMALL + shattering):  # without breakage, and with monomers
+        case = parse(text_)
+        assert estimate._breakage(case, case.run) == []

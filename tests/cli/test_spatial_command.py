@@ -8,7 +8,7 @@ from command import call
 from smolux import results
 from smolux.case import load, spatial
 from smolux.errors import InputError
-from smolux.spatial import simulate
+from smolux.spatial import running, simulate
 
 CASE = """\
 title = "few discs"
@@ -49,6 +49,18 @@ def test_a_case_from_run_to_movie(folder):
     assert "did you mean 'discs'" in call("plot", "few", "-k", "disks", code=2).stderr
     call("movie", "few", "-n", "2", "-p", "64")
     assert (folder / "few" / "movie.gif").is_file()
+
+
+def test_the_time_limit_stops_and_goes_on(folder, monkeypatch):
+    monkeypatch.setattr(running, "_BUDGET", 20)
+    (folder / "cut.toml").write_text(CASE.replace("seed = 2", "seed = 2\ntime_limit = 1e-9"))
+    stderr = call("run", "cut.toml", code=3).stderr
+    assert "the time limit of 1e-09 s is reached; what was reached is in cut" in stderr
+    assert "go on with: smolux run cut" in stderr
+    before = results.load(folder / "cut" / "results.nc")["events"].sizes["event"]
+    assert before <= 20
+    call("run", "cut", code=3)
+    assert results.load(folder / "cut" / "results.nc")["events"].sizes["event"] > before
 
 
 def test_a_case_in_three_dimensions_without_a_seed_gets_one(folder):

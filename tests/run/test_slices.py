@@ -5,13 +5,20 @@ How long a slice is depends on the clock, and a store grows when any replica of 
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import smolux as sx
-from smolux import processes
+from smolux import checkpoint as checkpoints
+from smolux import files, processes
+from smolux.core.state import GROW, STORED
+from smolux.methods import acceptance_rejection, base, inverse, low_rank, size_class
+from smolux.methods.acceptance_rejection_pieces import SLACK
+from smolux.methods.low_rank_store import POOL_NEEDED, TAIL
+from smolux.methods.size_class_state import CHUNK, FREE
 from smolux.plan import make_plan
 from smolux.replicas import Group
 
@@ -78,3 +85,105 @@ def test_slices_of_any_length(method: str, case: str, population: str) -> None:
         assert_same(whole, other, slice(None), slice(None))
     for r in range(3):
         assert_same(whole, finished(started(case, method, population, r, 1), 7), r, 0)
+
+
+# --- stores that grow by the least, and runs that are written at every turn -----------------------
+
+
+@pytest.fixture
+def grudging(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let every store grow by the least that is possible."""
+
+    def by_one(array: Any, capacity: int) -> Any:
+        return base.enlarged(array, array.shape[-1] + 1)
+
+    def by_a_chunk(work: Any) -> Any:
+        return size_class._with_chunks(work, work.free.shape[1] + 1, work.where.shape[2] + 1)
+
+    grow = low_rank.LowRank.grow
+
+    def by_an_entry(method: Any, work: Any, state: Any) -> Any:
+        wanted = work.meta[:, POOL_NEEDED]
+        wanted[:] = np.minimum(wanted, work.pool.shape[1] + 1)
+        return grow(method, work, state)
+
+    monkeypatch.setattr(acceptance_rejection, "enlarged", by_one)
+    monkeypatch.setattr(inverse, "enlarged", by_one)
+    monkeypatch.setattr(size_class, "_more_chunks", by_a_chunk)
+    monkeypatch.setattr(low_rank.LowRank, "grow", by_an_entry)
+
+
+def cut(group: Group) -> Group:
+    """Leave a store no room that it does not need."""
+    work, stored = group.work, int(group.state.count[:, STORED].max())
+    shorter = {}
+    if "free" in work._fields:  # chunks are taken from the end of the list of free ones
+        old, chunk = work.free.shape[1], int(work.meta[0, CHUNK])
+        used = max(1, old - int(work.meta[:, FREE].min()))
+        work.meta[:, FREE] -= old - used
+        longest = -(-int(work.number.max()) >> chunk)
+        shorter = {
+            "free": work.free[:, -used:],
+            "pool": work.pool[:, : used << chunk],
+            "where": work.where[:, :, : longest + 1],
+        }
+    elif "sizes" in work._fields:
+        shorter["sizes"] = work.sizes[:, : stored + SLACK]
+    elif "large" in work._fields:
+        shorter = {name: getattr(work, name)[:, : stored + 1] for name in ("large", "large_rate")}
+    elif "tree" in work._fields:
+        shorter["pool"] = work.pool[:, : int(work.meta[:, TAIL].max()) + 1]
+    group.work = work._replace(**{name: array.copy() for name, array in shorter.items()})
+    return group
+
+
+def written(group: Group, path: Path) -> Group:
+    """Return what a checkpoint leaves of a group."""
+    checkpoints.save(path, group.plan, [group])
+    (again,) = checkpoints.load(path)[1]
+    assert isinstance(again, Group)
+    again.loop = group.loop
+    return again
+
+
+@pytest.mark.parametrize(
+    ("case", "population"),
+    [
+        ("open, fewer at the start", "doubling"),
+        pytest.param("open", "fixed-volume", marks=slow),
+        pytest.param("pairs", "doubling", marks=slow),
+        pytest.param("single", "fixed-volume", marks=slow),
+    ],
+)
+@pytest.mark.parametrize("method", METHODS)
+def test_growth_by_the_least_and_resuming_at_every_slice(
+    method: str,
+    case: str,
+    population: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
+) -> None:
+    whole = finished(started(case, method, population, 0, 3), 1 << 40)
+    request.getfixturevalue("grudging")
+    monkeypatch.setattr(files, "_sync", lambda *_: None)  # nothing here is to last
+    grown = 0
+    # a slice of one candidate comes to thousands of files
+    for budget, every in ((1, 300), (7, 40), (1000, 1)):
+        group, turn = cut(started(case, method, population, 0, 3)), 0
+        while not group.done:
+            group._call(group.codes, budget)
+            if (group.codes == GROW).any():
+                grown += 1
+                expected = group.plan.method.growth(group.work, group.state)
+                before = group.work
+                group._serve()
+                new = [a for a, b in zip(group.work, before, strict=True) if a is not b]
+                assert sum(a.nbytes for a in new) <= expected
+            else:
+                group._serve()
+            turn += 1
+            if turn % every == 0:
+                group = written(group, tmp_path / "run.npz")
+        assert_same(whole, group, slice(None), slice(None))
+    assert grown

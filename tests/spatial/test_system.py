@@ -7,6 +7,8 @@ import pytest
 
 import smolux as sx
 import smolux.spatial as sp
+from smolux import resources, room
+from smolux.spatial import running
 
 FINE = {"position": [[1, 1], [3, 1]], "velocity": [[1, 0], [0, 1]], "radius": 0.5, "box": 4}
 
@@ -173,3 +175,21 @@ def test_interruption_keeps_what_was_reached():
     with pytest.raises(sx.Interrupted) as caught:
         sp.simulate(sp.lattice(100, 0.2, seed=3), progress=stop)
     assert caught.value.dataset.attrs["stopped"] == "interrupted"
+
+
+@pytest.mark.parametrize("why", ["the time limit of 1e-09 s", "memory: "])
+def test_the_clock_and_the_memory_stop_a_run(why, monkeypatch):
+    s, given = sp.lattice(100, 0.2, seed=3), {}
+    if why == "memory: ":
+        monkeypatch.setattr(room, "_SMALL", 0)
+        monkeypatch.setattr(resources, "free_memory", lambda: 0.0)
+    else:
+        given["time_limit"] = 1e-9
+    monkeypatch.setattr(running, "_BUDGET", 20)
+    cut = sp.simulate(s, **given)
+    monkeypatch.undo()
+    assert cut.attrs["stopped"].startswith(why)
+    assert not cut.attrs["complete"]
+    assert 1 <= cut["events"].sizes["event"] <= 20
+    whole, done = sp.simulate(s), sp.resume(cut)
+    np.testing.assert_array_equal(done["events"]["first"], whole["events"]["first"])

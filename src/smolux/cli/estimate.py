@@ -15,10 +15,13 @@ from ..case import Case
 from ..case.settings import Run
 from ..errors import Interrupted
 from ..initial import Sizes
+from ..methods import METHODS, SizeClass
+from ..methods.base import Method
 from ..pilot import settled
 from ..plan import make_plan
-from ..processes import Source
-from ..resources import cores
+from ..processes import Aggregation, Removal, Source
+from ..resources import available_memory, cores
+from ..room import amount
 
 Float = NDArray[np.float64]
 
@@ -27,6 +30,8 @@ _FIRST, _SHORT, _LIMIT = 1000, 0.2, 4.0
 _SEED = 20_240_229
 #: particles below which the means of a simulation say little
 _FEW = 100.0
+#: particles for each one at the start, that breakage may make, from which on that is told
+_MANY = 10.0
 
 
 @dataclass(frozen=True)
@@ -187,14 +192,14 @@ def estimate(case: Case) -> Estimate:
         collisions * small.seconds_per_collision / workers,
         memory,
         output,
-        [*physics_warnings(case), *_population_warnings(run, small), *_pilot_warnings(small)],
-    )
+        [
+            *physics_warnings(case), *_population_warnings(run, small), *_pilot_warnings(small),
+            *_breakage(case, run),
+        ],
+    )  # fmt: skip
 
 
 def _bytes(case: Case, run: Run, small: Pilot) -> tuple[float, float]:
-    from ..methods import METHODS, SizeClass
-
-    method = next((m for m in METHODS if m.name == run.method), SizeClass)()
     mass = run.particles * mean_size(case)
     octaves = max(0.0, float(np.log2(max(mass, 2) / run.sizes)))
     columns = 8 + len(run.orders) + run.sizes + octaves * run.bins_per_octave
@@ -202,7 +207,12 @@ def _bytes(case: Case, run: Run, small: Pilot) -> tuple[float, float]:
     if run.distribution:
         output += 16.0 * run.replicas * len(run.times) * min(run.particles, 2e5)
     most = int(run.particles * small.growth(run))
-    return run.replicas * method.bytes_per_replica(most) + output, output
+    return run.replicas * _method(run).bytes_per_replica(most) + output, output
+
+
+def _method(run: Run) -> Method:
+    """Return the method of a case; if it is to be chosen, one that is likely."""
+    return next((m for m in METHODS if m.name == run.method), SizeClass)()
 
 
 def mean_size(case: Case) -> float:
@@ -316,6 +326,24 @@ def _population_warnings(run: Run, small: Pilot) -> list[str]:
     if run.replicas == 1:
         found.append("one replica gives no error bars; use 8 or more")
     return found
+
+
+def _breakage(case: Case, run: Run) -> list[str]:
+    """Warn of breakage that may make far more particles than there are at the start."""
+    keeping = Aggregation, Removal, Source
+    names = [p.name for p in case.model.processes if not isinstance(p, keeping)]
+    times = mean_size(case)
+    if not names or times < _MANY or run.weighting != "number":
+        return []
+    most = times * run.particles
+    memory, there = run.replicas * _method(run).bytes_per_replica(int(most)), available_memory()
+    of = "" if there is None else f" of the {amount(there)} that there are"
+    return [
+        f"{', '.join(names)} can break the mass up into {most:.2g} particles of size 1 in each "
+        f"replica, {times:.2g} times as many as at the start, for which stores take up to "
+        f"{amount(memory)}{of}: a run that outgrows the memory stops, and goes on from its "
+        "checkpoint with more of it"
+    ]
 
 
 def _pilot_warnings(small: Pilot) -> list[str]:

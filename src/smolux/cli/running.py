@@ -69,8 +69,8 @@ def proceed(directory: RunDirectory, display: Callable[..., Display] = Display) 
     Raises
     ------
     Interrupted
-        On a signal or past the time limit: what there is has been written, and the run goes on from
-        there.
+        On a signal, past the time limit or without memory: what there is has been written, and the
+        run goes on from there, if it had a checkpoint.
     """
     case = directory.load()
     with Stopper() as stopper, warnings.catch_warnings():

@@ -322,21 +322,27 @@ def _more_classes(work: Work, classes: int) -> Work:
 
 def _more_chunks(work: Work) -> Work:
     """Double the pool, and the most that a list may hold."""
-    chunk = int(work.meta[0, CHUNK])
-    old = work.free.shape[1]
-    free = enlarged(work.free, 2 * old)
+    return _with_chunks(work, 2 * work.free.shape[1], 2 * work.where.shape[2])
+
+
+def _with_chunks(work: Work, chunks: int, stride: int) -> Work:
+    """Return the store with so many chunks, of which a list may hold `stride`."""
+    chunk, old = int(work.meta[0, CHUNK]), work.free.shape[1]
+    more = chunks - old
+    free = enlarged(work.free, chunks)
     for r in range(len(free)):  # the new chunks are used last: their memory may never be touched
         left = int(work.meta[r, FREE])
-        free[r, old : old + left] = work.free[r, :left]
-        free[r, :old] = np.arange(2 * old - 1, old - 1, -1)
-    more = work._replace(
+        free[r, more : more + left] = work.free[r, :left]
+        free[r, :more] = np.arange(chunks - 1, old - 1, -1)
+    wider = stride - work.where.shape[2]
+    grown = work._replace(
         free=free,
         # as places beyond the end were taken, so that those drawn ahead are right or found anew
-        where=np.pad(work.where, ((0, 0), (0, 0), (0, work.where.shape[2])), mode="edge"),
-        pool=enlarged(work.pool, 2 * old << chunk),
+        where=np.pad(work.where, ((0, 0), (0, 0), (0, wider)), mode="edge"),
+        pool=enlarged(work.pool, chunks << chunk),
     )
-    work.meta[:, FREE] += old
-    return more
+    work.meta[:, FREE] += more
+    return grown
 
 
 def _bounds(rates: Rates, edges: Int, g: Int, h: Int, single: int) -> tuple[Any, Any]:
