@@ -15,7 +15,7 @@ import runs
 import smolux as sx
 from shared import QUICK, VARYING
 from smolux import checkpoint as checkpoints
-from smolux import replicas, resources
+from smolux import replicas, resources, room
 from smolux.core.state import BUDGET, GROW
 from smolux.errors import InputError, Interrupted
 
@@ -150,6 +150,19 @@ def test_no_memory_to_grow_keeps_what_was_computed(
     ds: Any = caught.value.dataset
     assert not ds.attrs["complete"]
     assert np.isfinite(ds["number_density"].values[:, 1]).any()
+    runs.assert_same(expected, sx.resume(path))
+
+
+def test_no_memory_for_a_population_keeps_what_was_computed(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: dict[str, Any] = {"method": "acceptance-rejection", "rate": 0.1, "distribution": True}
+    expected, asked = simulate(**given), iter(range(10_000))
+    with monkeypatch.context() as patch:
+        patch.setattr(room, "_SMALL", 0)
+        patch.setattr(resources, "free_memory", lambda: 1e12 if next(asked) < 7 else 0.0)
+        with pytest.raises(InputError, match=r"the clusters of replica \d, to be kept, need"):
+            simulate(checkpoint=path, **given)
     runs.assert_same(expected, sx.resume(path))
 
 
