@@ -216,7 +216,7 @@ class _Driver:
         self.compile_seconds = self.compile_seconds or spent
         if code is None and spent > limit:
             return f"the time limit of {limit:g} s is reached"
-        return code or self._short()
+        return self._short() if code is None else code
 
     def _short(self) -> str | None:
         """Say if what has happened leaves too little memory for the result to be made of it."""
