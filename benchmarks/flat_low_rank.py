@@ -175,7 +175,7 @@ def new_arrays(kernel: Any, particles: int, octaves: int) -> tuple[Any, ...]:
     exact = (factor[1:] * scale / grains[1:]).min(axis=1)
     share = given.shares[0, :slots] * np.append(0.0, exact)
     left, right = given.term[0].T
-    weight = given.weights[0] / (scale[left] * scale[right])
+    weight = given.weights[0] / (scale[left] * scale[right] * given.units[0])
     levels = levels_of(slots)
     return (
         (grains, share, weight, given.term[0]),

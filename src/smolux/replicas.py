@@ -326,6 +326,12 @@ def initial_populations(plan: Plan, replicas: Sequence[int]) -> list[tuple[Int, 
 
 def _bad_rate(model: Model, state: State, r: int) -> str:
     i, j = int(state.count[r, WORST_I]), int(state.count[r, WORST_J])
+    if i == j == 0:  # of all particles together, see `smolux.methods.inverse_pieces`
+        return (
+            f"the rates of the kernel {model.kernel.label} of all pairs have no finite sum at "
+            f"t = {state.clock[r, TIME]:.6g}: take a longer unit of time, in which rates are "
+            "smaller, or method = 'low-rank'"
+        )
     culprit = int(state.count[r, CULPRIT])
     if culprit == 0:
         whose, where = f"the kernel {model.kernel.label}", f"sizes {i} and {j}"

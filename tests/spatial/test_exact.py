@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import plain_numpy
 import pytest
-from flights import assert_same, merges, run, system, wide_system
+from flights import METHODS, assert_same, merges, run, system, wide_system
 
 import smolux.spatial as sp
+from smolux.spatial.eventlog import Logger
 
 
 @pytest.mark.parametrize("number", range(100))
@@ -105,3 +106,53 @@ def test_a_miss_from_afar_is_a_miss(dimension, method):
         # centres at 1 aside touch at sqrt(3) ahead; positions are known to 1e-7
         time = trace.log.time[trace.log.merges]
         np.testing.assert_allclose(time, 4e8 - np.sqrt(3) / 2, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["all-pairs", "cells", "windowed"])
+def test_a_box_hardly_wider_than_two_discs(method):
+    """Two images of a disc are near another one all the time: neither may cut the steps short."""
+    for room in (1e-7, 1e-9):
+        s = sp.System(
+            position=[[0.1, 0.1], [1.12, 1.05]], velocity=[[1.0, 0.3], [-0.4, 0.2]], radius=0.5,
+            box=2.0 + room, walls="periodic",
+        )  # fmt: skip
+        current = METHODS[method]().start(s, np.empty(0))
+        stopped = None
+        for _ in range(200):
+            stopped = stopped if stopped is not None else current.advance(np.inf, 1, 10)
+        assert stopped == ""
+        np.testing.assert_array_equal(merges(current.trace()), [[0, 1]])
+        # the first of all images to be touched
+        gap = (
+            s.position[1]
+            - s.position[0]
+            + s.box.lengths[0] * np.array([[a, b] for a in (-1, 0, 1) for b in (-1, 0, 1)])
+        )
+        w = s.velocity[1] - s.velocity[0]
+        b, c = gap @ w, (gap**2).sum(1) - 1.0
+        square = b**2 - (w @ w) * c
+        times = np.where((square >= 0) & (b < 0), c / (np.sqrt(np.maximum(square, 0)) - b), np.inf)
+        assert current.time == pytest.approx(times.min(), rel=1e-12)
+
+
+@pytest.mark.parametrize("method", ["cells", "windowed"])
+def test_reflections_in_a_slit_are_counted(method, monkeypatch):
+    """The log of a disc that goes to and fro in a narrow slit does not grow with each touch."""
+    s = sp.System(
+        position=[[2.0, 0.5005], [3.5, 0.501], [0.6, 0.5]], radius=0.5, box=(10.0, 1.002),
+        velocity=[[1.0, 1.0], [1.5, -0.7], [0.05, 0.9]],
+    )  # fmt: skip
+    each = sp.simulate(s, method, until=8.0)
+    monkeypatch.setattr(Logger, "_MANY", 500)
+    few = sp.simulate(s, method, until=8.0)
+    walls = few["walls"]
+    assert walls.sizes["reflection"] < each["walls"].sizes["reflection"] / 20
+    total = walls.sizes["reflection"] + int(walls["more"].sum())
+    assert total == each["walls"].sizes["reflection"] > 4000
+    half = sp.simulate(s, method, until=3.0)
+    for one in (few, sp.resume(half, until=8.0)):
+        assert one["events"].sizes["event"] == 1
+        for t in (*np.random.default_rng(1).uniform(0.0, 8.0, 40), 7.9991):
+            a, b = sp.replay(each, float(t)), sp.replay(one, float(t))
+            np.testing.assert_allclose(a["position"], b["position"], rtol=0, atol=1e-9)
+            np.testing.assert_allclose(a["velocity"], b["velocity"], rtol=0, atol=1e-12)

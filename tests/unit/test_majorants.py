@@ -75,7 +75,7 @@ def test_tables_over_slots(law: Kernel, bits: int) -> None:
     factor, share = tables.factor[0], tables.shares[0]
     above = sum(
         w * (factor[a, p] * factor[b, q] + factor[b, p] * factor[a, q])
-        for w, (p, q) in zip(tables.weights[0], tables.term[0], strict=True)
+        for w, (p, q) in zip(tables.weights[0] / tables.units[0], tables.term[0], strict=True)
     )
     value = law(i, j)
     assert (value <= above).all()

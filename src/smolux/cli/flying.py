@@ -180,6 +180,7 @@ def text(tree: Any) -> str:
             f"{float(row['kinetic_energy']):12.5g}"
         )
     merges, walls = tree["events"].sizes["event"], tree["walls"].sizes["reflection"]
+    walls += int(tree["walls"]["more"].sum()) if "more" in tree["walls"] else 0
     lines += ["", f"{merges} merges and {walls} reflections until t = {a['time_reached']:.6g}."]
     lines += [f"warning: {w}" for w in json.loads(a.get("warnings", "[]"))]
     return "\n".join(lines).strip()

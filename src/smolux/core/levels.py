@@ -42,17 +42,20 @@ def _change_levels(s, edges, table, level):
     value = table[low, high]
     if math.isnan(value):
         return BOUND
-    level[0], level[1] = low, high
+    level[0], level[1] = level[2], level[3] = low, high
     s.clock[MAJORANT] = max(value, s.clock[FLOOR])
     return 0
 
 
 @piece
-def renew_majorant(s, edges, table, level):
+def renew_majorant(s, edges, table, level, apart):
     """Put the bound over the sizes present into the state; `BOUND` if it is not in the table yet.
 
-    ``level[0], level[1]`` are the levels the bound in force covers.
+    ``level[0], level[1]`` are the levels the bound in force covers; ``level[2], level[3]`` those of
+    all particles but one, if that is held `apart`: such bounds are in no table.
     """
     if s.count[SMALLEST] >= edges[level[0]] and s.count[LARGEST] < edges[level[1] + 1]:
         return 0
+    if apart:
+        return BOUND
     return _change_levels(s, edges, table, level)

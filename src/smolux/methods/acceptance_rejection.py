@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -10,7 +11,9 @@ import numpy as np
 from ..core.levels import level_edges, level_of
 from ..core.loop import Pieces
 from ..core.state import (
+    FLOOR,
     LARGEST,
+    MAJORANT,
     MONOMERS,
     PARTICLES,
     SMALLEST,
@@ -22,8 +25,9 @@ from ..core.state import (
     State,
 )
 from ..errors import InputError
-from .acceptance_rejection_pieces import AHEAD, Work, bind
-from .base import Int, Method, Rates, enlarged, spread
+from .acceptance_rejection_pieces import AHEAD, bind
+from .acceptance_rejection_store import APART, HIGH, LOW, Work
+from .base import Float, Int, Method, Rates, enlarged, spread
 
 #: rates of sizes up to this are tabulated when computing one costs more than reading it
 _TABLE = 192
@@ -74,9 +78,10 @@ class AcceptanceRejection(Method):
         ahead = np.full((len(populations), 2 * AHEAD), -1.0)
         edges = level_edges()
         levels = len(edges) - 1
-        level = np.tile(np.array([levels - 1, 0]), (len(populations), 1))
+        level = np.tile(np.array([levels - 1, 0, levels - 1, 0]), (len(populations), 1))
+        apart = np.zeros((len(populations), 5), np.int64)
         table = rates.table(0 if rates.cheap else _TABLE)
-        return Work(array, ahead, level, edges, np.full((levels, levels), np.nan), table)
+        return Work(array, ahead, level, apart, edges, np.full((levels, levels), np.nan), table)
 
     def grow(self, work: Work, state: State) -> Work:
         """See `Method.grow`."""
@@ -89,27 +94,24 @@ class AcceptanceRejection(Method):
         """
         count = state.count[replica]
         low, high = (int(level_of.py_func(work.edges, count[k])) for k in (SMALLEST, LARGEST))
-        if not np.isnan(work.majorant[low, high]):  # another replica has asked for it
+        if work.apart[replica, APART]:
+            found = _bound_apart(work, rates, replica, low, high)
+            state.clock[replica, MAJORANT] = max(found, state.clock[replica, FLOOR])
+        elif np.isnan(work.majorant[low, high]):  # else another replica has asked for it
+            block = high - high % 16
+            highs = np.arange(max(low, block), min(block + 16, work.majorant.shape[1]))
+            work.majorant[low, highs] = _bounds(work, rates, (low, highs), (low, highs))
+            found = work.majorant[low, high]
+        else:
             return
-        block = high - high % 16
-        highs = np.arange(max(low, block), min(block + 16, work.majorant.shape[1]))
-        top = (work.edges[highs + 1] - 1).astype(float)
-        bottom = np.full(top.shape, float(work.edges[low]))
-        bound = rates.bounds(bottom, top, bottom, top)[1]
-        if not rates.rigorous:
-            # zeros alone prove nothing: candidates go on coming, at the rate of all sizes so far
-            wider = rates.bounds(np.ones(top.shape), top, np.ones(top.shape), top)[1]
-            bound = np.where(bound > 0.0, bound, wider)
-        bound[bound == np.inf] = np.nan
-        work.majorant[low, highs] = np.maximum(bound, 0.0)
         smallest, largest = float(count[SMALLEST]), float(count[LARGEST])
-        if np.isnan(work.majorant[low, high]):
+        if np.isnan(found):
             raise InputError(
                 f"the kernel has no finite bound for the sizes {smallest:.0f} to {largest:.0f}, "
                 f"which were reached at t = {state.clock[replica, TIME]:.6g}; limit what grows, as "
                 "in exp(min(x, 500)), or end earlier"
             )
-        if work.majorant[low, high] == 0.0:  # no candidate would ever find a rate below zero
+        if found == 0.0:  # no candidate would ever find a rate below zero
             value = float(rates.arrays(smallest, largest))
             if not 0.0 <= value < np.inf:
                 state.clock[replica, VALUE] = value
@@ -126,3 +128,31 @@ class AcceptanceRejection(Method):
     def bytes_per_replica(self, particles: int) -> int:
         """See `Method.bytes_per_replica`."""
         return 8 * particles
+
+
+def _bounds(work: Work, rates: Rates, one: Sequence[Any], other: Sequence[Any]) -> Float:
+    """Bound the rates of sizes in some levels with those in others; NaN where there is no bound."""
+    a, c = (work.edges[np.asarray(side[0])].astype(float) for side in (one, other))
+    b, d = ((work.edges[np.asarray(side[1]) + 1] - 1).astype(float) for side in (one, other))
+    a, b, c, d = np.broadcast_arrays(a, b, c, d)
+    bound = rates.bounds(a, b, c, d)[1]
+    if not rates.rigorous:
+        # zeros alone prove nothing: candidates go on coming, at the rate of all sizes so far
+        ones = np.ones(d.shape)
+        bound = np.where(bound > 0.0, bound, rates.bounds(ones, d, ones, d)[1])
+    return np.where(bound == np.inf, np.nan, np.maximum(bound, 0.0))
+
+
+def _bound_apart(work: Work, rates: Rates, replica: int, low: int, high: int) -> float:
+    """Bound the rates of all pairs but one particle with itself, and write for which levels.
+
+    The one is the largest or the smallest, whichever gives the lower bound.
+    """
+    level = work.level[replica]
+    lows, highs = [level[2]], [level[3]]
+    if level[2] < 0:
+        lows, highs = [low, work.apart[replica, LOW]], [work.apart[replica, HIGH], high]
+    bounds = _bounds(work, rates, (lows, highs), (low, high))
+    k = 0 if np.isnan(bounds).all() else int(np.nanargmin(bounds))
+    level[:] = low, high, lows[k], highs[k]
+    return float(bounds[k])

@@ -29,39 +29,28 @@ from ..core.state import (
     VALUE,
     VOLUME,
 )
+from .acceptance_rejection_store import (
+    APART,
+    SLACK,
+    VAIN,
+    renew_all,
+    rescan,
+    seek_apart,
+    size_of,
+    view,
+    watch,
+)
 
 #: candidates whose pairs are drawn ahead, so that their memory is there when it is needed
 AHEAD = 8
 _ONE = at(1)
-#: entries past the particles that may be written to
-SLACK = 2
-
-
-class Work(NamedTuple):
-    """Monomers are only counted (``count[MONOMERS]``); all other particles lie in one array.
-
-    Attributes
-    ----------
-    sizes : int64 array of shape (R, capacity)
-        The first ``count[STORED]`` entries are the particles of sizes above 1.
-    ahead : float64 array of shape (R, 16)
-        Uniform numbers that choose the pairs of the next candidates; -1 before the first.
-    level : int64 array of shape (R, 2)
-        Levels that the bound in force covers.
-    edges, majorant, table : arrays
-        Edges of levels; bound for each pair of levels, NaN until asked for; rates of small sizes.
-    """
-
-    sizes: np.ndarray
-    ahead: np.ndarray
-    level: np.ndarray
-    edges: np.ndarray
-    majorant: np.ndarray
-    table: np.ndarray
 
 
 class Held(NamedTuple):
-    """What changes within a burst, and the bounds in force: sizes from `bottom` to below `top`."""
+    """What changes within a burst, and what is in force: sizes from `bottom` to below `top`.
+
+    The mean waiting time of two particles at the greatest rate is half of `unit`.
+    """
 
     monomers: Any
     stored: Any
@@ -69,25 +58,13 @@ class Held(NamedTuple):
     largest: Any
     bottom: Any
     top: Any
-
-
-@piece
-def _view(w, r):
-    return Work(w.sizes[r], w.ahead[r], w.level[r], w.edges, w.majorant, w.table)
-
-
-@piece
-def _size(w, monomers, slot):
-    # read first, choose then: which kind comes is a coin toss that no branch predictor wins
-    place = slot - monomers
-    size = w.sizes[at(max(place, 0))]
-    return size if place >= 0 else np.int64(1)
+    unit: Any
 
 
 @piece
 def _pair(s, w):
     monomers = s.count[MONOMERS]
-    return _size(w, monomers, s.count[FIRST]), _size(w, monomers, s.count[SECOND])
+    return size_of(w, monomers, s.count[FIRST]), size_of(w, monomers, s.count[SECOND])
 
 
 @cold_piece
@@ -129,7 +106,7 @@ def _make_find(rate: Any) -> Any:
     def find(s, w, p, factor, held, n, trials, c0, c1, c2, c3):
         """See `smolux.core.burst.Burst`; NaN for a rate that is none, which has been noted."""
         majorant, monomers = s.clock[MAJORANT], held.monomers
-        unit = 2.0 * s.clock[VOLUME] / (float(n) * float(n - 1) * majorant * factor)
+        unit = held.unit / (float(n) * float(n - 1))
         waited, last = 0.0, trials + PATIENCE
         while trials < last:
             k = at(2 * (trials & (AHEAD - 1)))
@@ -143,7 +120,7 @@ def _make_find(rate: Any) -> Any:
             w.ahead[k], w.ahead[k + _ONE] = u, v
             _ask(w, monomers, np.int64(u * n))
             _ask(w, monomers, np.int64(v * n))
-            i, j = _size(w, monomers, a), _size(w, monomers, b)
+            i, j = size_of(w, monomers, a), size_of(w, monomers, b)
             value = value_of(w, i, j, p)
             if not 0.0 <= value <= majorant:
                 if not 0.0 <= value < math.inf:
@@ -156,6 +133,7 @@ def _make_find(rate: Any) -> Any:
             u, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)
             if u * majorant < value:
                 return waited * unit, a, b, i, j, trials, c0, c1, c2, c3
+        w.apart[VAIN] = 1
         return waited * unit, -1, -1, 0, 0, trials, c0, c1, c2, c3
 
     return find
@@ -237,8 +215,10 @@ def _hold(s, w, factor):
         s.count[STORED],
         s.count[SMALLEST],
         s.count[LARGEST],
-        w.edges[w.level[0]],
-        w.edges[w.level[1] + 1],
+        w.edges[w.level[2]],
+        w.edges[w.level[3] + 1],
+        # one after the other: their product may be beyond all numbers
+        2.0 * s.clock[VOLUME] / s.clock[MAJORANT] / factor,
     )
 
 
@@ -253,7 +233,7 @@ def _replace(w, held, a, b, gone, size, count):
         one = a if gone == 1 else b
         monomers, stored = _exchange_one(w, held.monomers, held.stored, one, size, count)
     smallest, largest = min(held.smallest, size), max(held.largest, size)
-    return PLAIN, Held(monomers, stored, smallest, largest, held.bottom, held.top)
+    return PLAIN, Held(monomers, stored, smallest, largest, held.bottom, held.top, held.unit)
 
 
 @piece
@@ -286,6 +266,8 @@ def _update(s, w, gone, entries, p):
         needed += s.counts[e] if s.sizes[e] > 1 else 0
     if s.count[STORED] + needed > w.sizes.shape[0]:
         return False
+    if w.apart[APART] == 1:
+        watch(s, w, gone, entries)
     for e in range(entries):
         s.count[PARTICLES] += s.counts[e]
         s.count[SMALLEST] = min(s.count[SMALLEST], s.sizes[e])
@@ -309,25 +291,14 @@ def _update(s, w, gone, entries, p):
     return True
 
 
-@cold_piece
-def _rescan(s, w):
-    """Take the smallest and largest size afresh; the bound in force is then renewed."""
-    s.count[SINCE] = 0
-    low = np.int64(1) if s.count[MONOMERS] > 0 else max(w.sizes[0], np.int64(1))
-    high = low
-    for k in range(s.count[STORED]):
-        low = min(low, w.sizes[k])
-        high = max(high, w.sizes[k])
-    s.count[SMALLEST], s.count[LARGEST] = low, high
-    w.level[0], w.level[1] = w.edges.shape[0] - 2, 0
-
-
 @piece
 def _prepare(s, w, p):
+    if w.apart[VAIN] == 1:
+        seek_apart(s, w)
     if s.count[SINCE] > s.count[PARTICLES] + 64:
-        _rescan(s, w)
+        rescan(s, w)
     s.clock[MAJORANT] = max(s.clock[MAJORANT], s.clock[FLOOR])
-    return renew_majorant(s, w.edges, w.majorant, w.level)
+    return renew_majorant(s, w.edges, w.majorant, w.level, w.apart[APART] == 1)
 
 
 @cold_piece
@@ -335,6 +306,8 @@ def _double(s, w):
     stored = s.count[STORED]
     if 2 * stored + SLACK > w.sizes.shape[0]:
         return False
+    if w.apart[APART] == 1:  # of the one apart there are two now
+        renew_all(w)
     for k in range(stored):
         w.sizes[stored + k] = w.sizes[k]
     s.count[STORED] *= 2
@@ -363,7 +336,7 @@ def bind(rate: Any, tally: Any) -> Pieces:
     """Bind the pieces to a rate and a way to count."""
     find = _make_find(rate)
     return Pieces(
-        _view,
+        view,
         _make_draw(find),
         _pair,
         _update,

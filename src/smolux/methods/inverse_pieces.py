@@ -146,6 +146,9 @@ def _make_draw(pair_rate: Any, row_of: Any, total_of: Any) -> Any:
             return math.nan
         small, large = total_of(s, w, p)
         total = small + large
+        if not total < math.inf:
+            note_bad(s, 0, 0, total)
+            return math.nan
         if s.count[PARTICLES] < 2 or total <= 0.0:
             return math.inf
         wait = rng.exponential(s.rng) * 2.0 * s.clock[VOLUME] / (total * factor)

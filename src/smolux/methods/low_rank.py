@@ -23,7 +23,7 @@ from ..core.state import (
 )
 from ..errors import InputError
 from .base import Int, Method, Rates, enlarged, spread
-from .low_rank_pieces import make_draw, pair, pick, prepare, seize, update
+from .low_rank_pieces import make_draw, pair, pick, seize, update
 from .low_rank_store import (
     METAS,
     POOL_NEEDED,
@@ -37,7 +37,8 @@ from .low_rank_store import (
     make_visit,
     view,
 )
-from .majorants import Tables, fill_bounds, fitted, from_powers
+from .low_rank_trees import prepare
+from .majorants import Tables, fill_bounds, fitted, from_powers, units_of
 
 #: stages of a majorant that is found: one for each octave of the largest size
 _STAGES = 62
@@ -203,7 +204,8 @@ class LowRank(Method):
                 f"reached at t = {state.clock[replica, TIME]:.6g}; limit what grows, as in "
                 "exp(min(x, 500)), or end earlier"
             )
-        fitted(upper, self.single).store(Tables(*(getattr(work, f) for f in Tables._fields)), stage)
+        tables, units = Tables(*(getattr(work, f) for f in Tables._fields)), units_of(upper)
+        fitted(upper * units, self.single).store(tables, stage, units)
         smallest, largest = (float(state.count[replica, k]) for k in (SMALLEST, LARGEST))
         if not upper.any():  # no candidate would ever find a rate below zero
             value = float(rates.arrays(smallest, largest))

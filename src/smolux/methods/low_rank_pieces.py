@@ -11,44 +11,34 @@ from ..core import rng
 from ..core.compile import cold_piece, piece
 from ..core.loop import PATIENCE, ROUNDING, note_bad, repair
 from ..core.prefetch import prefetch
-from ..core.segment_tree import add, build, find, find_mixed
-from ..core.slots import octave
-from ..core.state import BOUND, FIRST, FLOOR, LARGEST, PARTICLES, SINCE, TRIALS, VALUE, VOLUME
+from ..core.segment_tree import add, find, find_mixed
+from ..core.state import FIRST, FLOOR, PARTICLES, TRIALS, VALUE, VOLUME
 from .low_rank_store import (
+    APART,
     POOL_NEEDED,
+    SEEK,
     SLOTS_NEEDED,
     STAGE,
-    WANTED,
     WIDEST,
     counted,
     has_room,
     insert,
     make_room,
     remove,
-    rescan,
     size_at,
     slot_for,
 )
+from .low_rank_trees import MOST, root_of
 
 #: a particle is a number of this many bits within its slot, and the slot above them
 _PLACE_BITS = 44
-
-#: sums are kept below this number of quanta, so that a uniform number can tell them all apart
-_MOST = 1 << 52
-#: what the quanta are chosen for
-_AIM = 2.0**44
-
-
-@piece
-def _root(w, row):
-    return w.tree[row, w.tree.shape[1] - 1]
 
 
 @piece
 def _term_total(w, stage, k):
     """Sum of one term of the majorant over all ordered pairs."""
     left, right = w.term[stage, k, 0], w.term[stage, k, 1]
-    return w.weight[k] * (float(_root(w, left)) * float(_root(w, right)))
+    return w.weight[k] * (float(root_of(w, left)) * float(root_of(w, right)))
 
 
 @piece
@@ -75,7 +65,7 @@ def _place(w, slot, x, weight):
 @piece
 def _choose(w, row, x):
     """Slot and place of a particle, by one factor; `x` is uniform in [0, 1)."""
-    root = _root(w, row)
+    root = root_of(w, row)
     slot, rest = find(w.tree, w.levels, row, min(np.int64(x * root), root - 1))
     return slot, _place(w, slot, float(rest), w.grains[slot, row])
 
@@ -96,7 +86,7 @@ def _pair_mixed(s, w, stage, total):
     w.mix[:] = 0.0
     for k in range(w.rank[stage, 1]):
         left, right = w.term[stage, k, 0], w.term[stage, k, 1]
-        w.mix[left] += w.weight[k] * _root(w, right)
+        w.mix[left] += w.weight[k] * root_of(w, right)
     a, place = _choose_mixed(w, stage, rng.uniform(s.rng) * total)
     w.chosen[0], w.chosen[1] = a, place
     w.mix[:] = 0.0
@@ -104,7 +94,7 @@ def _pair_mixed(s, w, stage, total):
     for k in range(w.rank[stage, 1]):
         left, right = w.term[stage, k, 0], w.term[stage, k, 1]
         w.mix[right] += w.weight[k] * w.grains[a, left]
-        others += w.weight[k] * w.grains[a, left] * _root(w, right)
+        others += w.weight[k] * w.grains[a, left] * root_of(w, right)
     w.chosen[2], w.chosen[3] = _choose_mixed(w, stage, rng.uniform(s.rng) * others)
 
 
@@ -128,6 +118,28 @@ def _pair_by_term(s, w, stage, total):
     # what is left of x is uniform below the weight of the term, and serves again
     w.chosen[0], w.chosen[1] = _choose(w, w.term[stage, k, 0], x / weight)
     w.chosen[2], w.chosen[3] = _choose(w, w.term[stage, k, 1], rng.uniform(s.rng))
+
+
+@cold_piece
+def _with_apart(w, stage):
+    """Sum of the majorant over the particle held apart and any other; coefficients in ``w.mix``."""
+    w.mix[:] = 0.0
+    for k in range(w.rank[stage, 1]):
+        left, right = w.term[stage, k, 0], w.term[stage, k, 1]
+        w.mix[left] += w.weight[k] * w.grains[w.meta[APART], right]
+        w.mix[right] += w.weight[k] * w.grains[w.meta[APART], left]
+    total = 0.0
+    for row in range(w.rank[stage, 0]):
+        total += w.mix[row] * root_of(w, row)
+    return total
+
+
+@cold_piece
+def _pair_with_apart(w, stage, x):
+    """Choose the particle held apart, and another at `x` in the sum of `_with_apart`."""
+    _with_apart(w, stage)
+    w.chosen[0], w.chosen[1] = w.meta[APART], 0
+    w.chosen[2], w.chosen[3] = _choose_mixed(w, stage, x)
 
 
 @cold_piece
@@ -176,13 +188,44 @@ def make_draw(rate: Any) -> Any:
             return 1
         i, j = pair(s, w)
         value = rate(float(i), float(j), *p)
-        majorant = raised * _majorant(w, stage, a, b)
-        if not 0.0 <= value <= majorant * ROUNDING:
+        majorant, units = raised * _majorant(w, stage, a, b), w.units[stage]
+        if not 0.0 <= value * units <= majorant * ROUNDING:
             if not 0.0 <= value < math.inf:
                 note_bad(s, i, j, value)
                 return -1
-            repair(s, i, j, value / majorant * raised, raised)
-        return 1 if x * majorant < value else 0
+            repair(s, i, j, value * units / majorant * raised, raised)
+        return 1 if x * majorant < value * units else 0
+
+    @cold_piece
+    def draw_with_apart(s, w, p, factor, others):
+        """Do the same with a particle that is held apart; `others` is the sum without it."""
+        stage, apart = w.meta[STAGE], _with_apart(w, w.meta[STAGE])
+        total = others + apart
+        if not total > 0.0:
+            return math.inf if s.clock[VALUE] == 0.0 else math.nan
+        raised = max(1.0, s.clock[FLOOR])
+        wait = 0.0
+        for _ in range(PATIENCE):
+            s.count[TRIALS] += 1
+            wait += rng.exponential(s.rng)
+            x = rng.uniform(s.rng) * total
+            if x < apart:
+                _pair_with_apart(w, stage, x)
+            elif w.rank[stage, 2] == 0:
+                _pair_by_term(s, w, stage, others)
+            else:
+                _pair_mixed(s, w, stage, others)
+            if w.chosen[0] == w.chosen[2] and w.chosen[1] == w.chosen[3]:
+                continue
+            verdict = accepted(s, w, p, stage, raised)
+            if verdict < 0:
+                return math.nan
+            if verdict > 0:
+                s.count[FIRST] = w.chosen[0]
+                break
+        if s.count[FIRST] < 0:
+            w.meta[STAGE] = -1
+        return wait * s.clock[VOLUME] / (total * raised * factor) * w.units[stage]
 
     @piece
     def draw(s, w, p, factor):
@@ -193,6 +236,8 @@ def make_draw(rate: Any) -> Any:
             total += _term_total(w, stage, k)
         if s.count[PARTICLES] < 2:
             return math.inf
+        if w.meta[APART] > 0:
+            return draw_with_apart(s, w, p, factor, total)
         if not total > 0.0:
             return math.inf if s.clock[VALUE] == 0.0 else math.nan
         # a majorant that was found broken is raised as a whole
@@ -213,7 +258,9 @@ def make_draw(rate: Any) -> Any:
             if verdict > 0:
                 s.count[FIRST] = w.chosen[0]
                 break
-        return wait * s.clock[VOLUME] / (total * raised * factor)
+        if s.count[FIRST] < 0:  # all in vain: perhaps one particle meets only itself
+            w.meta[SEEK], w.meta[STAGE] = 1, -1
+        return wait * s.clock[VOLUME] / (total * raised * factor) * w.units[stage]
 
     return draw
 
@@ -221,14 +268,18 @@ def make_draw(rate: Any) -> Any:
 @piece
 def _account(w, stage, a, b, c, count):
     """Account in all trees for one particle less in two slots and `count` more in another."""
+    apart = w.meta[APART]
+    if apart > 0 and (a == apart or b == apart or c == apart):
+        w.meta[STAGE] = -1
+        return
     for row in range(w.rank[stage, 0]):
         new = count * w.grains[c, row]
-        if new + _root(w, row) > _MOST:
+        if new + root_of(w, row) > MOST:
             w.meta[STAGE] = -1
             return
         less_a, less_b = -np.int64(w.grains[a, row]), -np.int64(w.grains[b, row])
         add(w.tree, w.levels, row, (a, b, c), (less_a, less_b, np.int64(new)))
-        if _root(w, row) < w.least[row]:
+        if root_of(w, row) < w.least[row]:
             w.meta[STAGE] = -1
 
 
@@ -286,65 +337,3 @@ def update(s, w, gone, entries, p):
         if w.meta[STAGE] >= 0:
             _account(w, stage, a, b, c, s.counts[e])
     return True
-
-
-@cold_piece
-def _build(w, stage, afresh):
-    """Choose quanta for which the sums are large whole numbers, and build the trees of them.
-
-    Unless `afresh`, the quanta are those of before, and so is everything that follows from them.
-    """
-    w.meta[STAGE] = stage
-    factors, slots = w.rank[stage, 0], w.number.shape[0]
-    for slot in range(slots):
-        w.share[slot] = w.shares[stage, slot]
-    for k in range(w.rank[stage, 1]):
-        w.weight[k] = w.weights[stage, k]
-    for row in range(factors):
-        total = 0.0
-        for slot in range(1, slots):
-            if w.number[slot] > 0.0:
-                total += w.number[slot] * w.factor[stage, slot, row]
-        if afresh:
-            w.scale[row] = 1.0
-            if total > 0.0:
-                w.scale[row] = math.ldexp(1.0, math.floor(math.log2(_AIM / total)))
-        scale = w.scale[row]
-        above = 1.0 if row < factors - w.rank[stage, 2] else 0.0
-        for slot in range(1, slots):
-            exact = w.factor[stage, slot, row] * scale
-            grains = np.floor(exact) + above
-            w.grains[slot, row] = grains
-            w.share[slot] = min(w.share[slot], w.shares[stage, slot] * (exact / grains))
-            if w.number[slot] > 0.0:
-                w.tree[row, slot] = np.int64(w.number[slot] * grains)
-            else:
-                w.tree[row, slot] = 0
-        build(w.tree, w.levels, row)
-        if afresh:
-            w.least[row] = _root(w, row) >> 8
-        elif not w.least[row] <= _root(w, row) <= _MOST:
-            w.meta[STAGE] = -1
-        for k in range(w.rank[stage, 1]):
-            for side in range(2):
-                if w.term[stage, k, side] == row:
-                    w.weight[k] /= scale
-
-
-@piece
-def prepare(s, w, p):
-    """Build the trees for the majorant of the octave that is reached, or ask for it."""
-    stage = np.int64(0)
-    if w.rank.shape[0] > 1:
-        if s.count[SINCE] > s.count[PARTICLES] + 64:
-            rescan(s, w)
-        stage = octave(s.count[LARGEST])
-    if stage != w.meta[STAGE]:
-        if w.rank[stage, 0] == 0:
-            w.meta[WANTED] = stage
-            return BOUND
-        if w.meta[STAGE] == -stage - 2:  # the arrays have grown
-            _build(w, stage, False)
-        if w.meta[STAGE] != stage:
-            _build(w, stage, True)
-    return 0

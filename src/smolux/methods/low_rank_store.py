@@ -24,6 +24,8 @@ SLOTS_NEEDED = 2  # what `grow` is asked for
 POOL_NEEDED = 3
 WANTED = 4  # row of the tables that `supply_bound` is asked for
 WIDEST = 5  # sizes above this need a pool of wider entries
+SEEK = 6  # 1: candidates were in vain; a particle that outweighs all others is to be held apart
+APART = 7  # slot of that particle, 0 if there is none
 METAS = 8
 
 
@@ -35,7 +37,8 @@ class Work(NamedTuple):
     number : float64 array of shape (R, C)
         Particles in each slot (whole numbers).
     tree : int64 array of shape (R, F, T)
-        Segment trees over ``number * grains``, see `smolux.core.segment_tree`.
+        Segment trees over ``number * grains``, without a particle that is held apart; see
+        `smolux.core.segment_tree`.
     levels : int64 array
         Where their levels begin.
     start, room, order : int64 arrays of shape (R, C)
@@ -68,6 +71,8 @@ class Work(NamedTuple):
     rank : int64 array of shape (S, 3)
         Factors and terms in use; how many factors, the last ones, are bounds from below, for terms
         of negative weight. Zeros where nothing is known yet.
+    units : float64 array of shape (S,)
+        Units in a rate of one: weights and sums are in units, so that they are no extreme numbers.
     bound : float64 array of shape (slots, slots), or empty
         Bounds of the kernel for pairs of slots, if the majorant is made of them; NaN until needed.
     bits : int64 array of shape (1,)
@@ -94,6 +99,7 @@ class Work(NamedTuple):
     weights: np.ndarray
     term: np.ndarray
     rank: np.ndarray
+    units: np.ndarray
     bound: np.ndarray
     bits: np.ndarray
 
@@ -122,6 +128,7 @@ def view(w, r):
         w.weights,
         w.term,
         w.rank,
+        w.units,
         w.bound,
         w.bits,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -22,6 +23,8 @@ _SWEEPS = 4
 #: bounds below this share of the largest are raised to it: bounds of a rate of zero may be no more
 #: than rounding, of which nothing can be made a multiple
 _LEAST = 1e-150
+#: units are between 4 to this power and its inverse, which are far from the ends of all numbers
+_MOST_HALVINGS = 500
 
 
 class Tables(NamedTuple):
@@ -32,6 +35,7 @@ class Tables(NamedTuple):
     weights: Float
     term: Int
     rank: Int
+    units: Float
 
     @classmethod
     def empty(cls, stages: int, slots: int) -> Tables:
@@ -42,6 +46,7 @@ class Tables(NamedTuple):
             np.zeros((stages, _TERMS)),
             np.zeros((stages, _TERMS, 2), np.int64),
             np.zeros((stages, 3), np.int64),
+            np.ones(stages),
         )
 
 
@@ -58,14 +63,26 @@ class Found(NamedTuple):
         half = np.einsum("k,ki,kj->ij", self.weight, left, right)
         return np.asarray(half + half.T)
 
-    def store(self, tables: Tables, stage: int) -> None:
-        """Write into a row of the tables."""
+    def store(self, tables: Tables, stage: int, units: float) -> None:
+        """Write into a row of the tables, as a majorant of rates times `units`."""
         factors, slots = self.factor.shape
         terms = len(self.weight)
         tables.factor[stage, 1 : slots + 1, :factors] = self.factor.T * (1.0 + _ROUNDING)
         tables.weights[stage, :terms] = self.weight
         tables.term[stage, :terms] = self.term
         tables.rank[stage] = factors, terms, 0
+        tables.units[stage] = units
+
+
+def units_of(rates: Float) -> float:
+    """Return units in a rate of one, the largest of some rates being about one unit.
+
+    An even power of two: nothing that is computed of them is rounded otherwise for it, square
+    roots included.
+    """
+    largest = float(np.max(np.abs(rates), initial=0.0))
+    half = math.frexp(largest)[1] // 2 if largest < math.inf else 0
+    return math.ldexp(1.0, -2 * min(max(half, -_MOST_HALVINGS), _MOST_HALVINGS))
 
 
 def from_powers(majorant: Majorant, edges: Int) -> Tables:
@@ -85,12 +102,15 @@ def from_powers(majorant: Majorant, edges: Int) -> Tables:
     # every factor falls by at most this share from its bound
     share = np.sqrt(majorant.least) * (least / most).min(axis=0) * (below == 0)
     term = [[rows.index(p) for p in powers[2 * k : 2 * k + 2]] for k in range(len(majorant.terms))]
+    weights = np.array([weight for weight, _, _ in majorant.terms])
+    units = units_of(weights)
     return Tables(
         np.concatenate((np.zeros((1, len(rows))), factor.T))[None].copy(),
         np.concatenate(([0.0], share))[None],
-        np.array([[weight for weight, _, _ in majorant.terms]]),
+        (weights * units)[None],
         np.array([term], np.int64),
         np.array([[len(rows), len(term), below]], np.int64),
+        np.array([units]),
     )
 
 

@@ -199,7 +199,7 @@ def _row(s, w):
 @piece
 def _hold(s, w, factor):
     # the unit of waiting times; a division at each event would take as long as drawing one
-    return (s.clock[VOLUME] / (s.clock[MAJORANT] * factor),)
+    return (s.clock[VOLUME] / s.clock[MAJORANT] / factor,)
 
 
 @piece

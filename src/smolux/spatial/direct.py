@@ -61,7 +61,7 @@ class DirectRun(Run):
             np.empty(d),
             np.empty(d),
         )
-        self.logger = Logger(_ROOM)
+        self.logger = Logger(_ROOM, d)
 
     @property
     def time(self) -> float:  # type: ignore[override]

@@ -63,6 +63,7 @@ class Player:
             system.mass.copy(),
             np.ones(n, np.int32),
             np.arange(n, dtype=np.int32),
+            np.zeros((n if log.more.any() else 0, d, 3)),
         )
         count = int(log.merges.sum())
         self.merging = Merging(
@@ -81,7 +82,7 @@ class Player:
         system, log = self.system, self.log
         self.nodes = self._compiled.replay(
             self.forest, merges, system.position, system.radius, system.box.periods, log.time,
-            log.first, log.second, self.event, stop, self.nodes, self._work,
+            log.first, log.second, log.more, log.until, self.event, stop, self.nodes, self._work,
         )  # fmt: skip
         self.event = stop
 

@@ -74,6 +74,11 @@ _WALLS = {
         "1 if the cluster fills the box along the axis and came to rest, else 0",
     ),
     "place": (("reflection",), "number of merges before it"),
+    "more": (
+        ("reflection",),
+        "reflections of the cluster along the axis after this one that are only counted",
+    ),
+    "until": (("reflection",), "time of the last of these; 0 if there are none"),
 }
 
 
@@ -147,6 +152,8 @@ def to_tree(
         "wall_axis": code % d,
         "at_rest": code // d,
         "place": np.cumsum(merges)[~merges],
+        "more": log.more[~merges],
+        "until": log.until[~merges],
     }
     # beside each other: what is above would hand its times down
     return xr.DataTree.from_dict(
@@ -244,11 +251,15 @@ def log_of(result: xr.DataTree) -> Log:
     # a reflection comes after as many merges as its place says
     merges = np.arange(events.sizes["event"])
     order = np.argsort(np.concatenate([merges + 0.5, walls["place"].values]), kind="stable")
-    return Log(
+    log = Log.of(
         np.concatenate([events["time"].values, walls["time"].values])[order],
         np.concatenate([events["first"].values, walls["disc"].values])[order].astype(np.int32),
         np.concatenate([events["second"].values, code])[order].astype(np.int32),
     )
+    if "more" in walls:  # files of earlier versions have an entry for each reflection
+        log.more[log.second < 0] = walls["more"].values
+        log.until[log.second < 0] = walls["until"].values
+    return log
 
 
 def trace_of(result: xr.DataTree) -> Trace:

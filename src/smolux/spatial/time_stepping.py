@@ -59,7 +59,7 @@ class SteppingRun(Run):
         self.system, self.settings = system, settings
         self._steps, self._stepping, self._events = steps, stepping, direct.Events
         self._loop = _loop(d)
-        self.logger = Logger(max(1 << 14, 2 * (d + 2) * n))
+        self.logger = Logger(max(1 << 14, 2 * (d + 2) * n), 0)
         self.series, self._next = empty_series(times, n, d), 0
         alpha, beta, damping, augmentation = settings.coefficients()
         self.recipe = minimising.Recipe(

@@ -33,11 +33,23 @@ class Log:
         The disc it met, of another cluster: the two clusters are one from then on. Below zero:
         ``-1 - k`` says that the cluster was reflected along axis k, ``-1 - d - k`` that it fills
         the box along axis k and came to rest along it.
+    more : ndarray of int64, shape (E,)
+        How often it was reflected along that axis after this, at even intervals, in reflections
+        that are counted here and have no entry of their own: an even number, mostly 0.
+    until : ndarray of shape (E,)
+        Time of the last of these.
     """
 
     time: Float
     first: Discs
     second: Discs
+    more: Int
+    until: Float
+
+    @classmethod
+    def of(cls, time: Float, first: Discs, second: Discs) -> Log:
+        """Make a log in which each reflection has an entry."""
+        return cls(time, first, second, np.zeros(len(time), np.int64), np.zeros(len(time)))
 
     @property
     def merges(self) -> NDArray[np.bool_]:

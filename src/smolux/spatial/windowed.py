@@ -111,22 +111,25 @@ class WindowedRun(Run):
     """A run of the windowed method."""
 
     def __init__(self, system: System, settings: Windowed, before: Trace | None = None) -> None:
-        from .events import direct, flight, packing
+        from .events import direct, flight, geometry, packing
 
         self.system, self.settings = system, settings
         self._flight, self._packing, self._events = flight, packing, direct.Events
         n, d = system.position.shape
         self._loop = _loop(d)
-        self.logger = Logger(min(_ROOM, 16 * n + 16))
+        self.logger = Logger(min(_ROOM, 16 * n + 4096), d)
         self.work, self.near = np.zeros((4, d)), np.zeros((3, 3), np.int64)
         box, widest = system.box, 2 * float(system.radius.max())
-        thickest = max(box.lengths) / 4
-        for side, periodic in zip(box.lengths, box.periodic, strict=True):
-            if periodic:  # no pair may come within reach of two images of each other
-                thickest = min(thickest, 0.49 * (side / 2 - widest))
+        thickest, images = max(box.lengths) / 4, 1
+        for side in np.array(box.lengths)[box.periodic]:
+            # no pair may come within reach of another image than those that are looked at
+            narrow = side / 2 - widest < geometry.NARROW * widest
+            thickest = min(thickest, 0.49 * (side - widest if narrow else side / 2 - widest))
+            images = 1 << d if narrow else images
         self._room = [int(_PAIRS * n) + 64, int(_EVENTS * n) + 64]
         self.count = np.zeros(flight.COUNTS, np.int64)
         self.count[flight.CLUSTERS] = n
+        self.count[flight.IMAGES] = images
         self.count[flight.SPREAD] = 0 if system.monodisperse else 1
         self.clock = np.zeros(flight.CLOCKS)
         self.clock[flight.SCALE] = float(np.sqrt((system.velocity**2).sum(1).max()))

@@ -8,7 +8,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.compile import entry, piece
-from .geometry import FILLED, contact_time, crossed, shift, wall_time
+from .geometry import (
+    FILLED,
+    NARROW,
+    contact_time,
+    crossed,
+    other_image,
+    shift,
+    smaller,
+    wall_time,
+)
 from .grid import insert, neighbour
 
 # Entries of Discs.clock.
@@ -59,21 +68,39 @@ class Discs(NamedTuple):
 
 
 @piece
-def pair_time(discs, i, j, d):
-    """Time to the contact of two discs, from the nearest image."""
-    s = discs.radius[i] + discs.radius[j]
-    a, b, c, cross = 0.0, 0.0, -s * s, 0.0
-    x1, w1, x2, w2 = 0.0, 0.0, 0.0, 0.0  # components before
+def pair_time(discs, i, j, d, images):
+    """Time to the contact of two discs, from the nearest image or the `images` nearest."""
+    s, best = discs.radius[i] + discs.radius[j], math.inf
+    for code in range(images):
+        a, b, c, cross = 0.0, 0.0, -s * s, 0.0
+        x1, w1, x2, w2 = 0.0, 0.0, 0.0, 0.0  # components before
+        for k in range(d):
+            dx = discs.x[j, k] - discs.x[i, k]
+            dx += shift(dx, discs.period[k])
+            if code & (1 << k):
+                dx += other_image(dx, discs.period[k])
+            w = discs.v[j, k] - discs.v[i, k]
+            a += w * w
+            b += dx * w
+            c += dx * dx
+            cross += crossed(dx, w, x1, w1, x2, w2)
+            x1, w1, x2, w2 = dx, w, x1, w1
+        best = smaller(best, contact_time(a, b, c, s, cross))
+    return best
+
+
+@piece
+def images_of(discs, widest, d):
+    """How many images of a disc to look at, and the gap to any other one along periodic axes."""
+    images, gap = 1, math.inf
     for k in range(d):
-        dx = discs.x[j, k] - discs.x[i, k]
-        dx += shift(dx, discs.period[k])
-        w = discs.v[j, k] - discs.v[i, k]
-        a += w * w
-        b += dx * w
-        c += dx * dx
-        cross += crossed(dx, w, x1, w1, x2, w2)
-        x1, w1, x2, w2 = dx, w, x1, w1
-    return contact_time(a, b, c, s, cross)
+        period = discs.period[k]
+        if period > 0.0 and 0.5 * period - widest < NARROW * widest:
+            images = 1 << d
+            gap = smaller(gap, period - widest)
+        elif period > 0.0:
+            gap = smaller(gap, 0.5 * period - widest)
+    return images, gap
 
 
 @piece
@@ -95,17 +122,14 @@ def bind_all_pairs(d):
     def search(discs, best, widest):
         first, second = np.int64(-1), np.int64(-1)
         n = discs.x.shape[0]
-        # beyond half a period other images may come first
-        reach = math.inf
-        for k in range(d):
-            if discs.period[k] > 0.0:
-                reach = min(reach, 0.5 * discs.period[k] - widest)
+        # beyond that other images may come first
+        images, reach = images_of(discs, widest, d)
         if reach < math.inf:
             best = min(best, reach / (2.0 * fastest(discs, d)))
         for i in range(n):
             for j in range(i + 1, n):
                 if discs.label[i] != discs.label[j]:
-                    t = pair_time(discs, i, j, d)
+                    t = pair_time(discs, i, j, d, images)
                     if t < best or (t == best and first < 0):
                         best, first, second = t, np.int64(i), np.int64(j)
         return best, first, second
@@ -127,22 +151,23 @@ def bind_cells(d):
 
     @piece
     def reach(discs, widest):
-        """Gap that two discs have at least, if their cells are not neighbours."""
+        """Images to look at, and the gap of two discs at least if their cells are no neighbours."""
         side = math.inf
         for k in range(d):
             if discs.cells[k] > 1:
                 side = min(side, discs.length[k] / discs.cells[k])
-            if discs.period[k] > 0.0:  # nor may another image come first
-                side = min(side, 0.5 * discs.period[k])
-        return side - widest
+        # nor may another image come first
+        images, gap = images_of(discs, widest, d)
+        return images, min(side - widest, gap)
 
     @piece
     def search(discs, best, widest):
         clock = discs.clock
+        images, gap = reach(discs, widest)
         if clock[TIME] >= clock[EDGE]:
             bin_all(discs)
             # the gap closes at twice the largest speed at most
-            clock[EDGE] = clock[TIME] + reach(discs, widest) / (2.0 * fastest(discs, d))
+            clock[EDGE] = clock[TIME] + gap / (2.0 * fastest(discs, d))
         best = min(best, clock[EDGE] - clock[TIME])
         first, second = np.int64(-1), np.int64(-1)
         for i in range(discs.x.shape[0]):
@@ -151,7 +176,7 @@ def bind_cells(d):
                 j = np.int64(discs.head[c] if c >= 0 else -1)
                 while j >= 0:
                     if j > i and discs.label[i] != discs.label[j]:
-                        t = pair_time(discs, i, j, d)
+                        t = pair_time(discs, i, j, d, images)
                         earlier = first < 0 or (first == i and j < second)
                         if t < best or (t == best and earlier):
                             best, first, second = t, np.int64(i), j
@@ -255,7 +280,9 @@ def bind(make_search, d):
                 clock[CLUSTERS] -= 1
                 clock[LATEST] = clock[TIME]
             elif dt == wall:
-                first, second = np.int64(disc), np.int64(reflect(discs, disc, axis))
+                # of the discs of a cluster always the same
+                first = np.int64(discs.label[disc])
+                second = np.int64(reflect(discs, disc, axis))
             else:  # only the pairs to look at change
                 continue
             log.time[done] = clock[TIME]

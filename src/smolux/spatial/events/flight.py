@@ -42,7 +42,8 @@ MARK_LISTED = 14  # the same when the skin was last judged
 MARK_CHECKED = 15
 MARK_PREDICTED = 16
 PACKED = 17  # window before which discs were put into the order of space
-COUNTS = 18
+IMAGES = 18  # of a disc that are looked at: 1, or the nearest two along each axis
+COUNTS = 19
 
 # Columns of Flight.body after displacement and velocity, which take 2 d.
 SINCE = 0  # time of the displacement

@@ -8,6 +8,9 @@ from ...core.compile import piece
 
 #: a cluster that leaves less than this share of an axis free fills the box along it
 FILLED = 1e-12
+#: a period of less than two largest diameters and twice this share of one is narrow: two images of
+#: a disc may be near another one, and both are looked at
+NARROW = 0.25
 
 
 @piece
@@ -60,3 +63,9 @@ def wall_time(low, high, v, length):
 def shift(d, period):
     """Return what makes a component of a separation that of the nearest image."""
     return -period * math.floor(d / period + 0.5) if period > 0.0 else 0.0
+
+
+@piece
+def other_image(d, period):
+    """Return what makes a component, that of the nearest image, that of the next but one."""
+    return -period if d > 0.0 else period

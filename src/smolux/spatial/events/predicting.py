@@ -18,6 +18,7 @@ from .flight import (
     FAR_CLUSTER,
     HALF,
     HORIZON,
+    IMAGES,
     LISTED_IN,
     LOT,
     MASS,
@@ -31,7 +32,7 @@ from .flight import (
     VERSION,
     WAY,
 )
-from .geometry import contact_time, crossed, shift, smaller, wall_time
+from .geometry import contact_time, crossed, other_image, shift, smaller, wall_time
 from .heap import push
 from .pairs import drop
 
@@ -46,6 +47,34 @@ def bind(d):
         for k in range(d):
             square += f.body[c, d + k] * f.body[c, d + k]
         return math.sqrt(square)
+
+    @cold_piece
+    def from_other_images(f, p, t):
+        """Time to the contact of a pair, from all images but the nearest one."""
+        half_edge, disc, body = f.half_edge, f.disc, f.body
+        i, j = np.int64(half_edge[2 * p, DISC]), np.int64(half_edge[2 * p + 1, DISC])
+        g, h = disc[i, BLOCK], disc[j, BLOCK]
+        m, n = f.block[g, CLUSTER], f.block[h, CLUSTER]
+        s = f.radius[i * f.count[SPREAD]] + f.radius[j * f.count[SPREAD]]
+        best = math.inf
+        for code in range(1, f.count[IMAGES]):
+            a, b, c, cross = 0.0, 0.0, -s * s, 0.0
+            x1, w1, x2, w2 = 0.0, 0.0, 0.0, 0.0  # components before
+            for k in range(d):
+                vm, vn = body[m, d + k], body[n, d + k]
+                x = f.rel[j, k] + f.place[h, k] + body[n, k] + vn * (t - body[n, since])
+                x -= f.rel[i, k] + f.place[g, k] + body[m, k] + vm * (t - body[m, since])
+                x += shift(x, f.period[k])
+                if code & (1 << k):
+                    x += other_image(x, f.period[k])
+                w = vn - vm
+                a += w * w
+                b += x * w
+                c += x * x
+                cross += crossed(x, w, x1, w1, x2, w2)
+                x1, w1, x2, w2 = x, w, x1, w1
+            best = smaller(best, contact_time(a, b, c, s, cross))
+        return best
 
     @piece
     def predict(f, p, t):
@@ -81,7 +110,10 @@ def bind(d):
             x1, w1, x2, w2 = x, w, x1, w1
         f.count[PREDICTED] += 1
         half_edge[2 * p, VERSION] += 1
-        touch = t + contact_time(a, b, c, s, cross)
+        wait = contact_time(a, b, c, s, cross)
+        if f.count[IMAGES] > 1:
+            wait = smaller(wait, from_other_images(f, p, t))
+        touch = t + wait
         if touch <= smaller(body[m, horizon], body[n, horizon]):
             push(f, touch, p, half_edge[2 * p, VERSION])
 

@@ -26,6 +26,9 @@ class Forest(NamedTuple):
     mass: np.ndarray
     size: np.ndarray
     node: np.ndarray  # number of the cluster in the merger tree
+    # for each axis, from when to when reflections were only counted, and the time between two; or
+    # empty, if each has an entry
+    turns: np.ndarray
 
 
 class Merges(NamedTuple):
@@ -55,10 +58,38 @@ def find(forest, disc, total):
 
 
 @piece
+def along(turns, time):
+    """Way along an axis at a velocity of one, to and fro while reflections were only counted."""
+    start, end, interval = turns[0], turns[1], turns[2]
+    if time >= end:
+        return time - end
+    way = time - start
+    way -= 2.0 * interval * math.floor(way / (2.0 * interval))
+    return way if way < interval else 2.0 * interval - way
+
+
+@piece
+def moved(forest, root, k, time):
+    """For how long a cluster has moved along an axis, since its displacement is known."""
+    if forest.turns.shape[0] == 0:
+        return time - forest.since[root]
+    return along(forest.turns[root, k], time) - along(forest.turns[root, k], forest.since[root])
+
+
+@piece
+def direction(forest, root, k, time):
+    """Return -1 if a cluster is on its way back between two walls."""
+    if forest.turns.shape[0] == 0 or time >= forest.turns[root, k, 1]:
+        return 1.0
+    turns = (time - forest.turns[root, k, 0]) / forest.turns[root, k, 2]
+    return 1.0 if turns - 2.0 * math.floor(0.5 * turns) < 1.0 else -1.0
+
+
+@piece
 def bring(forest, root, time):
     """Bring a cluster to a time."""
     for k in range(forest.offset.shape[1]):
-        forest.offset[root, k] += forest.velocity[root, k] * (time - forest.since[root])
+        forest.offset[root, k] += forest.velocity[root, k] * moved(forest, root, k, time)
     forest.since[root] = time
 
 
@@ -108,7 +139,9 @@ def join(forest, a, b, image, work):
 
 
 @entry
-def replay(forest, merges, x, radius, period, time, first, second, start, stop, nodes, work):
+def replay(
+    forest, merges, x, radius, period, time, first, second, more, until, start, stop, nodes, work
+):
     """Go through events; return the number of nodes of the merger tree, `nodes` of them before."""
     n, d = x.shape
     gap, image = work[2], work[3]
@@ -119,6 +152,9 @@ def replay(forest, merges, x, radius, period, time, first, second, start, stop, 
         if j < 0:
             axis = (-1 - j) % d
             forest.velocity[a, axis] *= 0.0 if -1 - j >= d else -1.0
+            if more[e] > 0:
+                forest.turns[a, axis, 0], forest.turns[a, axis, 1] = time[e], until[e]
+                forest.turns[a, axis, 2] = (until[e] - time[e]) / more[e]
             continue
         b = find(forest, j, work[1])
         bring(forest, b, time[e])
@@ -145,6 +181,6 @@ def positions(forest, x, time, out, velocity, label, least, work):
         label[i] = least[root]
         for k in range(d):
             v = forest.velocity[root, k]
-            shifted = forest.offset[root, k] + v * (time - forest.since[root])
+            shifted = forest.offset[root, k] + v * moved(forest, root, k, time)
             out[i, k] = x[i, k] + work[0, k] + shifted
-            velocity[i, k] = v
+            velocity[i, k] = v * direction(forest, root, k, time)
