@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 import smolux
 
 from . import analysis, exact, initial, kernels, processes
+from .errors import quiet
 from .kernels.base import Kernel
 from .methods import METHODS
 from .model import Model
@@ -301,7 +302,8 @@ def verify(
         for check in only or checks():
             begun = time.perf_counter()
             # other random numbers for each method
-            verdict = check.test(name, seed + 1000 * known.index(name))
+            with quiet():  # small systems end as one cluster, and laws say when
+                verdict = check.test(name, seed + 1000 * known.index(name))
             yield Finding(
                 name, check.name, verdict.measured, verdict.expected, verdict.p,
                 time.perf_counter() - begun,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 
 
@@ -72,6 +74,20 @@ class WorkerError(RuntimeError):
 
 class SmoluxWarning(UserWarning):
     """Something the user should know of a result: also stored in its attributes."""
+
+
+def warn(texts: Sequence[str], level: int) -> None:
+    """Issue warnings at the line of the user, who called the function `level` calls above this."""
+    for text in texts:
+        warnings.warn(text, SmoluxWarning, stacklevel=level + 2)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Issue no warnings of smolux: they stand in the results, and are told with them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SmoluxWarning)
+        yield
 
 
 def did_you_mean(word: str, choices: Sequence[str]) -> str:

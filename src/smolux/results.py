@@ -11,7 +11,7 @@ import platform
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 from xarray.indexes import PandasIndex
 
 from . import __version__
-from .errors import InputError
+from .errors import InputError, warn
 from .files import replacing
 from .model import Model
 from .model_dict import model_to_dict
 from .records import Records
 
 Float = NDArray[np.float64]
+Result = TypeVar("Result", xr.Dataset, xr.DataTree)
 
 #: raised whenever a name, a dimension or a meaning changes
 SCHEMA = 1
@@ -240,6 +241,38 @@ def _indexed(coordinates: Mapping[str, Any]) -> xr.Coordinates:
         else:
             found[name] = values
     return xr.Coordinates(found, indexes)
+
+
+def warnings(ds: xr.Dataset | xr.DataTree) -> list[str]:
+    """Return what a result warns of, in the order in which it came.
+
+    Each is issued as a `SmoluxWarning` too, when a computation ends; this is for a result that was
+    read from a file, or made where nobody looked.
+
+    Parameters
+    ----------
+    ds : xarray.Dataset or xarray.DataTree
+
+    Returns
+    -------
+    list of str
+        Empty if there is nothing to beware of.
+
+    Examples
+    --------
+    >>> import smolux as sx
+    >>> model = sx.Model(kernel=sx.kernels.Constant())
+    >>> ds = sx.simulate(model, times=[1], particles=1000, seed=1)
+    >>> sx.results.warnings(ds)
+    []
+    """
+    return list(json.loads(ds.attrs.get("warnings", "[]")))
+
+
+def told(ds: Result) -> Result:
+    """Issue the warnings of a result, and return it: for what the user called, and nothing else."""
+    warn(warnings(ds), level=2)
+    return ds
 
 
 def population(ds: xr.Dataset, replica: int, time: float) -> tuple[NDArray[np.int64], ...]:

@@ -21,6 +21,7 @@ from .pilot import settled
 from .plan import make_plan
 from .remembered import spent
 from .resources import cores
+from .results import told
 from .subvolumes import start
 from .weighting.base import Weighting
 
@@ -137,6 +138,12 @@ def simulate(
     WorkerError
         If processes of an executor die again and again; its `dataset` holds what others computed.
 
+    Warns
+    -----
+    SmoluxWarning
+        If the result is not all that was asked for, or may be off; `smolux.results.warnings` has
+        the same of a result that was kept.
+
     Notes
     -----
     Waiting times are exponential, so every distribution of the process is exact, fluctuations
@@ -165,13 +172,14 @@ def simulate(
     plan = settled(plan)
     planned = spent() - before
     if executor is not None and not isinstance(executor, ThreadPoolExecutor):
-        return Elsewhere(plan, executor, progress, workers_of(executor), planned).finish()
+        return told(Elsewhere(plan, executor, progress, workers_of(executor), planned).finish())
     workers = max(1, cores() // plan.subvolumes)
     groups = [start(plan, *part) for part in plan.groups(workers)]
     file = None if checkpoint is None else Path(checkpoint).expanduser()
-    return Threads(
+    run = Threads(
         plan, groups, executor, progress, file, checkpoint_every, time_limit, workers, planned
-    ).finish()
+    )
+    return told(run.finish())
 
 
 def resume(
@@ -209,10 +217,11 @@ def resume(
     file = Path(checkpoint).expanduser()
     plan, groups = checkpoints.load(file, model)
     workers = max(1, cores() // plan.subvolumes)
-    return Threads(
+    run = Threads(
         plan, groups, executor, progress, file, checkpoint_every, time_limit, workers,
         resumed=True,
-    ).finish()  # fmt: skip
+    )  # fmt: skip
+    return told(run.finish())
 
 
 def _control_problems(

@@ -8,7 +8,6 @@ long they last. For rare sizes this rests on far more particles than the count o
 from __future__ import annotations
 
 import json
-import warnings
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from smolux.checks import whole
-from smolux.errors import InputError, SmoluxWarning
+from smolux.errors import InputError, warn
 from smolux.kernels.base import Kernel
 from smolux.model import Model
 from smolux.weighting import MassFlow, Number, WeightFunction
@@ -210,11 +209,10 @@ def _dataset(ds: xr.Dataset, sizes: Any, values: Float, errors: Float) -> xr.Dat
     off = errors[-1] > error[-1]
     if off.any():
         worst = int(np.argmax(np.where(off, errors[-1] / error[-1], 0.0)))
-        warnings.warn(
+        text = (
             f"the density of size {sizes[worst]} at the last time changes by "
             f"{errors[-1, worst]:.2g} if every other output time is left out, its standard error "
-            f"is {error[-1, worst]:.2g}: use more output times",
-            SmoluxWarning,
-            stacklevel=3,
+            f"is {error[-1, worst]:.2g}: use more output times"
         )
+        warn([text], level=2)
     return result

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from smolux.errors import InputError
+from smolux.results import warnings
 
 from .statistics import over_replicas, quantile
 from .table import aligned
@@ -129,7 +130,7 @@ def _describe(result: xr.Dataset, like: xr.Dataset) -> None:
 def _warnings(present: Sequence[xr.Dataset]) -> list[str]:
     counted: dict[str, int] = {}
     for ds in present:
-        for text in json.loads(ds.attrs.get("warnings", "[]")):
+        for text in warnings(ds):
             counted[text] = counted.get(text, 0) + 1
     return [text if n == 1 else f"{text} (at {n} points)" for text, n in counted.items()]
 

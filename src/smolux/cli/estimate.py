@@ -13,7 +13,7 @@ import smolux
 
 from ..case import Case
 from ..case.settings import Run
-from ..errors import Interrupted
+from ..errors import Interrupted, quiet
 from ..initial import Sizes
 from ..methods import METHODS, SizeClass
 from ..methods.base import Method
@@ -137,10 +137,11 @@ def _once(case: Case, particles: int, weighting: Any) -> tuple[Any, bool]:
             raise KeyboardInterrupt
 
     try:
-        ds = smolux.simulate(
-            case.model, times, method=run.method, weighting=weighting, particles=particles,
-            replicas=1, seed=_SEED, orders=(0,), sizes=1, progress=halt,
-        )  # fmt: skip
+        with quiet():  # of a pilot
+            ds = smolux.simulate(
+                case.model, times, method=run.method, weighting=weighting, particles=particles,
+                replicas=1, seed=_SEED, orders=(0,), sizes=1, progress=halt,
+            )  # fmt: skip
     except Interrupted as stop:
         return stop.dataset, False
     return ds, True

@@ -13,7 +13,7 @@ import typer
 from .. import plotting, results, spatial
 from ..case import spatial as cases
 from ..case.spatial import FIGURES, SpatialCase
-from ..errors import InputError, Interrupted, did_you_mean
+from ..errors import InputError, Interrupted, did_you_mean, quiet
 from . import rundir
 from .console import amount, duration, say
 from .progress import Display
@@ -73,7 +73,7 @@ def _simulate(case: SpatialCase, directory: RunDirectory, before: Any) -> Any:
         say(f"going on at t = {before.attrs['time_reached']:.6g}")
         begun = partial(spatial.resume, before)
         del arguments["method"]
-    with Stopper() as stopper, Display(stopper.check) as progress:
+    with Stopper() as stopper, Display(stopper.check) as progress, quiet():
         stopper.patient = True
         try:
             tree = begun(progress=progress, **arguments)
@@ -182,7 +182,7 @@ def text(tree: Any) -> str:
     merges, walls = tree["events"].sizes["event"], tree["walls"].sizes["reflection"]
     walls += int(tree["walls"]["more"].sum()) if "more" in tree["walls"] else 0
     lines += ["", f"{merges} merges and {walls} reflections until t = {a['time_reached']:.6g}."]
-    lines += [f"warning: {w}" for w in json.loads(a.get("warnings", "[]"))]
+    lines += [f"warning: {w}" for w in results.warnings(tree)]
     return "\n".join(lines).strip()
 
 

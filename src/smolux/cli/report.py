@@ -14,6 +14,7 @@ import smolux
 from .. import analysis
 from ..case import Case
 from ..files import replacing
+from ..results import warnings
 from . import showing
 from .console import amount, duration
 
@@ -75,11 +76,11 @@ def write(
 def page(case: Case, ds: Any, solution: Any = None, figures: Sequence[Path] = ()) -> str:
     """Return the report as HTML; it loads nothing from anywhere."""
     title = case.title or f"{case.model.kernel.name} kernel"
-    warnings = list(dict.fromkeys([*showing.warnings(ds), *_of(solution)]))
+    found = list(dict.fromkeys([*warnings(ds), *_of(solution)]))
     parts = [
         f"<h1>{escape(title)}</h1>",
         f'<p class="dim">{escape(_subtitle(ds))}</p>',
-        *(f'<p class="warning">{escape(w)}</p>' for w in warnings),
+        *(f'<p class="warning">{escape(w)}</p>' for w in found),
         "<h2>Results</h2>",
         *_summary(ds),
         *_agreement(ds, solution),
@@ -102,7 +103,7 @@ def page(case: Case, ds: Any, solution: Any = None, figures: Sequence[Path] = ()
 
 
 def _of(ds: Any) -> list[str]:
-    return [] if ds is None else showing.warnings(ds)
+    return [] if ds is None else warnings(ds)
 
 
 def _subtitle(ds: Any) -> str:

@@ -25,6 +25,7 @@ def run(
     """
     from ..case import load, spatial
     from ..errors import InputError
+    from ..results import warnings
     from . import flying, report, rundir, running, showing
     from .console import say
 
@@ -47,7 +48,7 @@ def run(
     typer.echo(showing.text(outcome.results))
     if outcome.solution is not None:
         typer.echo(f"\n{report.agreement(outcome.results, outcome.solution)}")
-        for warning in showing.warnings(outcome.solution):
+        for warning in warnings(outcome.solution):
             typer.echo(f"warning: rate equations: {warning}")
     for remark in outcome.remarks:
         say(remark)

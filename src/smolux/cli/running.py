@@ -6,7 +6,6 @@ import errno
 import json
 import os
 import tempfile
-import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -20,7 +19,7 @@ from .. import results
 from ..case import Case, parse
 from ..deterministic import SolverError
 from ..deterministic.solver import solve
-from ..errors import InputError, Interrupted, OutOfMemoryError, SmoluxWarning, WorkerError
+from ..errors import InputError, Interrupted, OutOfMemoryError, WorkerError, quiet
 from ..executors import opened
 from ..model_dict import model_to_dict
 from . import figures, report
@@ -73,9 +72,7 @@ def proceed(directory: RunDirectory, display: Callable[..., Display] = Display) 
         run goes on from there, if it had a checkpoint.
     """
     case = directory.load()
-    with Stopper() as stopper, warnings.catch_warnings():
-        # they stand in the results, and are told with them
-        warnings.simplefilter("ignore", SmoluxWarning)
+    with Stopper() as stopper, quiet():
         try:
             return _stages(case, directory, stopper, display)
         except KeyboardInterrupt as stop:

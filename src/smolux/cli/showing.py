@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from .. import analysis, results
 from ..errors import InputError
+from ..results import warnings
 
 
 def find(path: Path) -> Path:
@@ -44,11 +44,6 @@ def load_solution(path: Path) -> Any:
     """Read the solution of the rate equations beside a result; None if there is none."""
     file = find(path).with_name("solution.nc")
     return results.load(file) if file.is_file() and file != path else None
-
-
-def warnings(ds: Any) -> list[str]:
-    """Return the warnings that a result carries."""
-    return list(json.loads(ds.attrs.get("warnings", "[]")))
 
 
 #: output times in a table, unless all are wanted

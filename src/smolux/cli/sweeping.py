@@ -8,7 +8,7 @@ from typing import Any
 
 import smolux
 
-from ..errors import InputError, Interrupted
+from ..errors import InputError, Interrupted, quiet
 from ..sweeps import go_on
 from ..sweeps.grid import failures
 from . import showing
@@ -37,7 +37,7 @@ def proceed(
     if begun and (over or sets or output is not None):
         raise InputError(f"{case}: is a sweep that was begun: it goes on as it is, without options")
     folder = case if begun else output or Path(f"{case.stem}-sweep")
-    with Stopper() as stopper:
+    with Stopper() as stopper, quiet():
         stopper.patient = False
         try:
             with display(check=stopper.check, what="sweeping") as progress:

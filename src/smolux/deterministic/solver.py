@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..content import frozen
-from ..errors import InputError, Interrupted, SmoluxWarning
+from ..errors import InputError, Interrupted
 from ..model import Model
-from ..results import to_dataset
+from ..results import to_dataset, told
 from .arguments import DIRECT_LIMIT, Settings, check
 from .equations import Equations
 from .integrate import Integrator
@@ -163,10 +162,7 @@ def solve(
         dataset = to_dataset(model, run.records(time.perf_counter() - started))
         reached = run.integrator.t
         raise Interrupted(f"stopped at t = {reached:.6g}", dataset) from None
-    records = run.records(time.perf_counter() - started)
-    for text in records.warnings:
-        warnings.warn(text, SmoluxWarning, stacklevel=2)
-    return to_dataset(model, records)
+    return told(to_dataset(model, run.records(time.perf_counter() - started)))
 
 
 class _Run:

@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..results import told
 from .result import system_of, trace_of
 from .running import Limits, SpatialProgress, checked, driven
 from .windowed import Windowed
@@ -61,7 +62,7 @@ def resume(
     limits = Limits(until, clusters, max_events, time_limit)
     tree = driven(system, method, begun, output, limits, progress)
     tree.attrs["wall_seconds"] += float(result.attrs.get("wall_seconds", 0.0))
-    return tree
+    return told(tree)
 
 
 def _method_of(result: xr.DataTree) -> Windowed:

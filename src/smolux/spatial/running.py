@@ -121,7 +121,8 @@ def simulate(
     Notes
     -----
     A run that stops before its goal, at a limit or because memory would not last, says why: its
-    attribute ``complete`` is 0, and ``stopped`` and its warnings hold the reason.
+    attribute ``complete`` is 0, ``stopped`` has the reason, and so has a warning, see
+    `smolux.results.warnings`.
 
     References
     ----------
@@ -135,12 +136,14 @@ def simulate(
     >>> result["events"].sizes["event"]
     99
     """
+    from ..results import told
+
     chosen, output = checked(
         system, method, until, clusters, times, max_events, time_limit, progress
     )
     begun = partial(chosen.start, system, np.empty(0) if output is None else output)
     limits = Limits(until, clusters, max_events, time_limit)
-    return driven(system, chosen, begun, output, limits, progress)
+    return told(driven(system, chosen, begun, output, limits, progress))
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
@@ -17,7 +16,7 @@ import smolux
 from .. import results
 from ..analysis.gathering import gather
 from ..case import Case
-from ..errors import InputError, Interrupted, SmoluxWarning
+from ..errors import InputError, Interrupted, quiet
 from ..executors import adapted, completed, opened
 from ..resources import available_memory
 from .over import read_axes
@@ -112,6 +111,11 @@ def sweep(
     Interrupted
         On Ctrl-C. What is finished is kept.
 
+    Warns
+    -----
+    SmoluxWarning
+        With what the points warn of, and at how many of them.
+
     Examples
     --------
     >>> ds = sx.sweep("case.toml", {"kernel.a": [0.9, 0.95]}, directory="a")  # doctest: +SKIP
@@ -120,7 +124,7 @@ def sweep(
     plan, drawn = make_sweep(case, read_axes(over), sets)
     _check_memory(plan.points())  # and all mistakes, before there is a folder
     folder = Folder(Path(directory).expanduser())
-    return _Running(folder, folder.begin(plan, drawn), executor, progress).finish()
+    return results.told(_Running(folder, folder.begin(plan, drawn), executor, progress).finish())
 
 
 def go_on(
@@ -132,7 +136,7 @@ def go_on(
     """Go on with the sweep in a folder; see `sweep`."""
     folder = Folder(Path(directory).expanduser())
     plan = folder.load()
-    return _Running(folder, folder.begin(plan, False), executor, progress).finish()
+    return results.told(_Running(folder, folder.begin(plan, False), executor, progress).finish())
 
 
 def run_point(case: Case) -> xr.Dataset:
@@ -142,8 +146,7 @@ def run_point(case: Case) -> xr.Dataset:
 
 
 def _computed(case: Case, executor: Executor | None, progress: Any) -> xr.Dataset:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SmoluxWarning)  # they stand in the results
+    with quiet():
         if case.run is not None:
             given = case.run.arguments()
             times = given.pop("times")
