@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 #: kernel of the tests of laws and of runs: 1, i + j, i j and the ballistic one by its coefficients
 FORMULA = "c0 + c1*(i + j) + c2*i*j + c3*(cbrt(i) + cbrt(j))**2*sqrt(1/i + 1/j)"
 #: the constant kernel by this formula, in a case file
@@ -17,3 +19,7 @@ c3 = 0.0
 VARYING = "0.4 * (1 + sin(5 * t))"
 #: methods whose loops compile fast; with the others, what does not depend on the method is slow
 QUICK = ("size-class", "acceptance-rejection")
+#: for tests of small systems in a fixed volume, which end as one cluster: that is no mistake there
+extinction = pytest.mark.filterwarnings(
+    "default:.*ended as one cluster:smolux.errors.SmoluxWarning"
+)

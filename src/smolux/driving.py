@@ -31,6 +31,8 @@ _EXHAUSTED = (
     "memory: there is no more: use fewer particles, replicas, sizes or output times, or let this "
     "process have more memory"
 )
+#: intervals below this share of the mean are rounding, of what is conserved
+_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ class Run:
         if verdict.error > goal.error:
             time_ = self.plan.times[verdict.at]
             self.remarks.append(shortfall(goal, verdict, done, time_))
-        elif verdict.error < 1 / self.plan.particles and goal.target != "largest":
+        elif _ROUNDING < verdict.error < 1 / self.plan.particles and goal.target != "largest":
             self.remarks.append(
                 f"the interval of {goal.target} is no longer than the bias of a finite population "
                 f"may be, of the order of 1/particles = {1 / self.plan.particles:g}, and which "

@@ -12,7 +12,9 @@ import pytest
 
 import smolux as sx
 from shared import QUICK as QUICK_METHODS
-from shared import VARYING
+from shared import VARYING, extinction
+
+pytestmark = extinction
 
 DATA = Path(__file__).parent.parent / "reference" / "data"
 METHODS = [method.name for method in sx.methods.METHODS]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ import smolux as sx
 from shared import VARYING
 from smolux import plan, resources, room, subvolumes
 from smolux.core.state import TIME
-from smolux.errors import InputError
+from smolux.errors import InputError, SmoluxWarning
 from smolux.exact import finite
 from smolux.replicas import Group
 from smolux.subvolumes import Divided
@@ -67,7 +66,7 @@ def test_goes_on_from_a_checkpoint(distribution: bool, tmp_path: Path) -> None:
         if ds.attrs["complete"]:
             break
     runs.assert_same(expected, ds)
-    assert json.loads(ds.attrs["warnings"]) == []
+    assert sx.results.warnings(ds) == []
     if distribution:
         assert ds["sample_count"].sum() == ds["particles"].sum()
 
@@ -138,10 +137,10 @@ def test_a_kernel_above_its_bound_is_remembered() -> None:
         return 1.0 + 20.0 * np.exp(-((((i - j) ** 2 - 1369.0) / 74.0) ** 2))
 
     model = sx.Model(kernel=sx.kernels.from_function(ridge, bounds=lambda a, b, c, d: (1.0, 1.5)))
-    ds = sx.simulate(
-        model, [30.0], particles=4000, replicas=1, seed=1, subvolumes=2, method="size-class"
-    )
-    assert "above its bound" in json.loads(ds.attrs["warnings"])[0]
+    with pytest.warns(SmoluxWarning, match="above its bound"):
+        sx.simulate(
+            model, [30.0], particles=4000, replicas=1, seed=1, subvolumes=2, method="size-class"
+        )
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import runs
 
 import smolux as sx
 from smolux import driving, replicas, stochastic
-from smolux.errors import InputError
+from smolux.errors import InputError, SmoluxWarning
 from smolux.goal import Goal, judge
 
 TIMES = [0.0, 0.5, 2.0]
@@ -39,7 +38,7 @@ def test_the_target_is_reached_and_the_result_is_that_of_a_plain_run() -> None:
     assert half_width(ds) <= WANTED
     assert ds.attrs["reached_error"] == pytest.approx(half_width(ds), rel=1e-9)
     assert (ds.attrs["target"], ds.attrs["target_error"]) == ("number_density", WANTED)
-    assert json.loads(ds.attrs["warnings"]) == []
+    assert sx.results.warnings(ds) == []
     # a quarter fewer would not have done, by the scatter that was found
     assert half_width(ds) > 0.6 * WANTED
     plain = simulate(target_error=None, replicas=ds.sizes["replica"])
@@ -77,9 +76,10 @@ def test_enough_from_the_start() -> None:
 
 
 def test_the_most_replicas_end_it_with_a_warning() -> None:
-    ds = simulate(target_error=0.001, max_replicas=13)
+    with pytest.warns(SmoluxWarning, match="not reached with 13"):
+        ds = simulate(target_error=0.001, max_replicas=13)
     assert ds.sizes["replica"] == 13
-    (warning,) = json.loads(ds.attrs["warnings"])
+    (warning,) = sx.results.warnings(ds)
     assert "target_error = 0.001 was not reached with 13 replicas" in warning
     assert "number_density" in warning
     assert "t = 2" in warning
@@ -87,15 +87,13 @@ def test_the_most_replicas_end_it_with_a_warning() -> None:
 
 
 def test_what_nobody_has_seen_has_no_interval() -> None:
-    ds = simulate(target="n_37", target_error=0.1, max_replicas=9)
-    (warning,) = json.loads(ds.attrs["warnings"])
-    assert "too little was seen" in warning
+    with pytest.warns(SmoluxWarning, match="too little was seen"):
+        simulate(target="n_37", target_error=0.1, max_replicas=9)
 
 
 def test_the_bias_of_few_particles_is_told() -> None:
-    ds = simulate(target_error=0.045, particles=20, max_replicas=2000)
-    (warning,) = json.loads(ds.attrs["warnings"])
-    assert "1/particles = 0.05" in warning
+    with pytest.warns(SmoluxWarning, match=r"1/particles = 0\.05"):
+        simulate(target_error=0.045, particles=20, max_replicas=2000)
 
 
 def test_the_same_on_threads_and_processes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -141,9 +139,11 @@ def test_replicas_that_no_longer_fit_end_it(monkeypatch: pytest.MonkeyPatch) -> 
         raise InputError("the run needs more than there is")
 
     monkeypatch.setattr(driving, "check_memory", full)
-    ds = simulate()
+    with pytest.warns(SmoluxWarning) as told:
+        ds = simulate()
     assert ds.sizes["replica"] == 8
-    warnings = json.loads(ds.attrs["warnings"])
+    warnings = sx.results.warnings(ds)
+    assert [str(w.message) for w in told] == warnings
     assert len(warnings) == 2
     assert "no further replicas" in warnings[0]
     assert "not reached" in warnings[1]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from dataclasses import replace
@@ -16,7 +15,7 @@ import smolux as sx
 from shared import QUICK
 from smolux import assembly
 from smolux.core.state import REPAIRS
-from smolux.errors import InputError
+from smolux.errors import InputError, SmoluxWarning
 from smolux.replicas import Group
 from smolux.timefunction import TimeFunction
 
@@ -70,14 +69,6 @@ def simulate(value: float, method: str, bounds: Any = None, **settings: Any) -> 
     return sx.simulate(model(value, bounds), [30.0], method=chosen, **given | settings)
 
 
-def warnings(ds: Any) -> list[str]:
-    return json.loads(ds.attrs["warnings"])
-
-
-def found_above(ds: Any) -> list[str]:
-    return [w for w in warnings(ds) if "above its bound" in w]
-
-
 def one(*box: float) -> tuple[float, float]:
     return 1.0, 1.0
 
@@ -119,21 +110,24 @@ def test_no_rate_where_bounds_are_sampled(method: str, value: float) -> None:
 
 @every_method
 def test_a_size_that_is_never_reached_is_no_obstacle(method: str) -> None:
-    ds = simulate(9.0, method, eight, particles=20, population="none")
-    assert found_above(ds) == []
+    with pytest.warns(SmoluxWarning, match="extinction"):
+        ds = simulate(9.0, method, eight, particles=20, population="none")
+    (warning,) = sx.results.warnings(ds)
+    assert "above its bound" not in warning
 
 
 @pytest.mark.parametrize("bounds", [below_one, one])
 @every_method
 def test_bounds_that_do_not_hold_are_repaired(method: str, bounds: Any) -> None:
-    ds = simulate(8.0, method, bounds)
     right = simulate(8.0, method, eight)
-    assert found_above(right) == []
     if method == "inverse":  # needs no bounds
-        assert found_above(ds) == []
-        runs.assert_same(right, ds)
+        runs.assert_same(right, simulate(8.0, method, bounds))
         return
-    (warning,) = found_above(ds)
+    with pytest.warns(SmoluxWarning, match="above its bound") as told:
+        ds = simulate(8.0, method, bounds)
+    (warning,) = sx.results.warnings(ds)
+    assert [str(w.message) for w in told] == [warning]
+    assert [w.filename for w in told] == [__file__]
     sizes = re.search(r"at the sizes (\d+) and (\d+)", warning)
     assert sizes is not None
     assert 21 in map(int, sizes.groups())
@@ -214,12 +208,15 @@ def with_rate(low: float, high: float, method: str, end: float = 0.5, **settings
 
 @every_method
 def test_a_rate_above_its_sampled_bound_is_repaired(method: str) -> None:
-    ds = with_rate(1.0, 5.0, method)
-    (warning,) = [w for w in warnings(ds) if "above its sampled bound" in w]
+    with pytest.warns(SmoluxWarning, match="above its sampled bound"):
+        ds = with_rate(1.0, 5.0, method)
+    (warning,) = sx.results.warnings(ds)
     assert "shattering" in warning
     assert "spike" in warning
     assert "of 2 replicas" in warning
-    runs.assert_same(ds, with_rate(1.0, 5.0, method, replicas=1))
+    with pytest.warns(SmoluxWarning, match="in 1 of 1 replicas"):
+        alone = with_rate(1.0, 5.0, method, replicas=1)
+    runs.assert_same(ds, alone)
 
 
 @every_method
@@ -230,7 +227,7 @@ def test_a_rate_that_turns_negative_where_it_was_not_tried(method: str) -> None:
     assert "shattering, spike, is -1 at t = 0.32" in message
     assert "zero or more" in message
     # not if the run ends before
-    assert warnings(with_rate(1.0, -1.0, method, 0.2, particles=100, replicas=1)) == []
+    assert sx.results.warnings(with_rate(1.0, -1.0, method, 0.2, particles=100, replicas=1)) == []
 
 
 def test_a_rate_that_is_seen_to_turn_negative() -> None:

@@ -239,3 +239,48 @@ def test_table_leaves_out_what_is_not_known():
     (_, rows), *_ = analysis.tables(sx.summary(ds.isel(replica=[0])))
     assert rows[0] == ("time", "value")
     assert {len(row) for row in rows} == {2}
+
+
+def test_the_mass_that_is_conserved_is_said_to_be():
+    ds = synthetic.constant_dataset()
+    assert analysis.mass_balance(ds) == "Mass M1 = 1, constant to rounding."
+    assert analysis.format_table(sx.summary(ds)).endswith("constant to rounding.\n")
+    ds["moment"].loc[{"order": 1, "time": 5.0, "replica": 3}] = 1.01
+    assert analysis.mass_balance(ds).endswith("constant to 1.0e-02.")
+    assert analysis.mass_balance(ds.sel(order=[0, 2])) == ""
+
+
+def test_the_mass_of_an_open_system_is_a_balance():
+    """A source brings J t; with removal at the rate r, M1 = exp(-r t) (1 - J/r) + J/r."""
+    processes = [sx.processes.Aggregation(), sx.processes.Removal(0.5), sx.processes.Source(2.0)]
+    ds = sx.solve(sx.Model(sx.kernels.Constant(), processes), [0.0, 1.0, 2.0])
+    now = 4 - 3 * np.exp(-1.0)
+    text = analysis.mass_balance(ds)
+    assert text == (
+        f"Mass M1 = 1 at t = 0, + 4 that came in, - {5 - now:.6g} that left, = {now:.6g} at t = 2; "
+        "this adds up to rounding."
+    )
+    assert text in analysis.format_table(sx.summary(ds))
+    # from the first output time on, whatever the volume is
+    later = ds.sel(time=[1.0, 2.0])
+    later["volume"] *= [1.0, 2.0]
+    for name in ("mass", "mass_in", "mass_out"):
+        later[name] *= [1.0, 2.0]
+    first = 4 - 3 * np.exp(-0.5)
+    assert analysis.mass_balance(later).startswith(
+        f"Mass M1 = {first:.6g} at t = 1, + 2 that came in, - {first + 2 - now:.6g} that left,"
+    )
+    ds["mass"][0, 1] *= 1.01
+    assert f"this adds up but for {0.01 * first / 3:.1e} of it" in analysis.mass_balance(ds)
+
+
+def test_the_balance_of_a_system_that_begins_empty_and_of_a_run_that_was_stopped():
+    processes = [sx.processes.Aggregation(), sx.processes.Source(2.0)]
+    model = sx.Model(sx.kernels.Constant(), processes, sx.initial.empty())
+    ds = sx.solve(model, [0.0, 1.0, 2.0])
+    assert "M1 = 0 at t = 0, + 4 that came in, - 0 that left, = 4 at t = 2" in (
+        analysis.mass_balance(ds)
+    )
+    for name in ("mass", "mass_in", "mass_out", "volume"):
+        ds[name][0, 2] = np.nan
+    assert "+ 2 that came in, - 0 that left, = 2 at t = 1" in analysis.mass_balance(ds)

@@ -24,6 +24,13 @@ GUIDES = [
 ]
 #: these compile more loops than others
 LONG = ("choose-a-method", "efficiency", "many-cores", "resume", "units", "your-own-kernel")
+MARKS = dict.fromkeys(LONG, pytest.mark.slow) | {
+    # warnings that are meant, or that few replicas make
+    "particles-and-replicas": pytest.mark.filterwarnings(
+        "default:target_error:smolux.errors.SmoluxWarning"
+    ),
+    "warnings": pytest.mark.filterwarnings("default:.*extinction:smolux.errors.SmoluxWarning"),
+}
 
 
 @pytest.fixture
@@ -109,10 +116,7 @@ def test_readme_case_file(small):
 
 @pytest.mark.parametrize(
     "page",
-    [
-        pytest.param(page, marks=pytest.mark.slow if page.stem in LONG else (), id=page.stem)
-        for page in GUIDES
-    ],
+    [pytest.param(page, marks=MARKS.get(page.stem, ()), id=page.stem) for page in GUIDES],
 )
 def test_code_of_a_guide(page, small, tmp_path):
     """The blocks of a page run one after the other, as a reader would type them."""

@@ -1,5 +1,6 @@
 """What results say: means and intervals, agreement, oscillations, gelation, scaling."""
 
+from .balance import mass_balance
 from .by_rates import densities_by_rates
 from .compare import compare
 from .gathering import format_sweep, sweep_table
@@ -21,6 +22,7 @@ __all__ = [
     "format_table",
     "gel_fraction",
     "gelation",
+    "mass_balance",
     "mean_size",
     "model_of",
     "moments",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from smolux.errors import InputError
 
+from .balance import mass_balance
 from .reference import exact_dataset, is_deterministic
 from .statistics import ROUNDING, deviation, over_replicas, quantile
 
@@ -120,7 +121,8 @@ def summary(ds: xr.Dataset, sizes: Sequence[int] = (1, 2, 5, 10, 20, 50, 100)) -
     xarray.Dataset
         The variables number_density, moment and n with a dimension ``statistic``, whose labels are
         mean, standard_error, lower, upper, exact, sigmas and replicas; the attributes say what they
-        mean, and ``notes`` what should be known of this result. `format_table` makes text of it.
+        mean, ``notes`` what should be known of this result, and ``mass`` whether the mass adds up,
+        see `mass_balance`. `format_table` makes text of it.
 
     Raises
     ------
@@ -148,4 +150,5 @@ def summary(ds: xr.Dataset, sizes: Sequence[int] = (1, 2, 5, 10, 20, 50, 100)) -
     result.attrs = {key: ds.attrs[key] for key in kept if key in ds.attrs}
     result.attrs["statistics"] = "; ".join(f"{k}: {v}" for k, v in _MEANINGS.items())
     result.attrs["notes"] = " ".join(_notes(ds, result, exact))
+    result.attrs["mass"] = mass_balance(ds)
     return result

@@ -117,7 +117,8 @@ def format_table(summary: xr.Dataset, variables: Sequence[str] | None = None) ->
     lines: list[str] = []
     for title, rows in tables(summary, variables):
         lines += [title, *aligned(rows), ""]
-    return "\n".join([*lines, summary.attrs.get("notes", "")]).rstrip() + "\n"
+    words = [summary.attrs.get(name, "") for name in ("notes", "mass")]
+    return "\n".join([*lines, *(w for w in words if w)]).rstrip() + "\n"
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:

@@ -133,7 +133,7 @@ def _summary(ds: Any) -> list[str]:
     summary = showing.chosen(ds, showing.MOST)
     tables = [_table(title, rows[0], rows[1:]) for title, rows in analysis.tables(summary)]
     notes = (
-        showing.mass(ds),
+        str(summary.attrs["mass"]),
         showing.shown(ds, showing.MOST),
         str(summary.attrs.get("notes", "")),
     )

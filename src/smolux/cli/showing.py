@@ -77,7 +77,7 @@ def text(ds: Any, most: int = MOST) -> str:
         facts.append("unfinished")
     lines = [str(attributes.get("title", "")), ", ".join(f for f in facts if f), ""]
     lines.append(analysis.format_table(chosen(ds, most)).rstrip())
-    lines += [mass(ds), shown(ds, most)]
+    lines.append(shown(ds, most))
     lines += [f"warning: {w}" for w in warnings(ds)]
     return "\n".join(line for n, line in enumerate(lines) if line or n == 2).strip()
 
@@ -91,21 +91,10 @@ def shown(ds: Any, most: int) -> str:
 def chosen(ds: Any, most: int) -> Any:
     """Return the summary of at most so many times and of the moments that change."""
     times = ds.sizes["time"]
+    some = ds
     if times > most:
-        ds = ds.isel(time=np.unique(np.linspace(0, times - 1, most).round().astype(int)))
-    summary = analysis.summary(ds, sizes=())
-    changing = [p for p in summary["order"].values if p not in (0, 1)]
+        some = ds.isel(time=np.unique(np.linspace(0, times - 1, most).round().astype(int)))
+    summary = analysis.summary(some, sizes=()).assign_attrs(mass=analysis.mass_balance(ds))
+    constant = (0,) if "mass_in" in ds else (0, 1)  # what M0 is, the number density says
+    changing = [p for p in summary["order"].values if p not in constant]
     return summary.drop_vars("n").sel(order=changing)
-
-
-def mass(ds: Any) -> str:
-    """Say how well the mass is conserved; nothing if it was not observed."""
-    if 1 not in ds["order"].values:
-        return ""
-    m1 = ds["moment"].sel(order=1).transpose("replica", "time").values
-    m1 = m1[np.isfinite(m1[:, 0])]  # replicas that were begun
-    if not m1.size:
-        return ""
-    spread = float(np.max((np.nanmax(m1, axis=1) - np.nanmin(m1, axis=1)) / m1[:, 0]))
-    words = "to rounding" if spread < 1e-12 else f"to {spread:.1e}"
-    return f"Mass M1 = {np.nanmean(m1):.6g}, constant {words}."
