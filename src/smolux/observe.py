@@ -234,7 +234,7 @@ def _add(found: list[str], name: str, raised: Float, missed: float, events: int,
 
 def _warnings(plan: Plan, groups: Sequence[Group | Divided], unfinished: int) -> list[str]:
     clock = np.concatenate([g.state.clock for g in groups])
-    found = _broken_bounds(plan, groups)
+    found = [*plan.model.initial.remarks, *_broken_bounds(plan, groups)]
     found += _rarely_accepted(plan, groups)
     extinct = clock[:, EXTINCT]
     ended = int(np.isfinite(extinct).sum())

@@ -9,6 +9,9 @@ import pytest
 import runs
 
 import smolux as sx
+from shared import QUICK
+from smolux.case import parse
+from smolux.cli.estimate import physics_warnings
 from smolux.replicas import initial_populations
 
 INITIALS = {
@@ -96,6 +99,37 @@ def test_lognormal_median_and_width() -> None:
     assert np.exp((k * n).sum()) == pytest.approx(1000.0, rel=1e-4)
     width = np.sqrt((k**2 * n).sum() - (k * n).sum() ** 2)
     assert np.exp(width) == pytest.approx(1.5, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("median", "sigma", "change"),
+    [(0.1, 2.0, True), (1.3, 1.05, True), (2.0, 2.0, True), (3.0, 1.5, False), (50.0, 3.0, False)],
+)
+def test_mass_that_rounding_changes_is_told(median: float, sigma: float, change: bool) -> None:
+    law = sx.initial.lognormal(median, sigma, density=3.0)
+    meant, found = law.mass
+    assert meant == pytest.approx(3.0 * median * np.exp(np.log(sigma) ** 2 / 2), rel=1e-12)
+    drawn = law.densities(law.largest) @ np.arange(1.0, law.largest + 1)
+    assert found == pytest.approx(drawn, rel=1e-6)
+    assert (abs(drawn / meant - 1) > 0.01) == change
+    assert len(law.remarks) == change
+    if change:
+        assert f"{meant:.4g}, and {found:.4g}" in law.remarks[0]
+
+
+def test_the_result_and_the_check_tell_of_mass_that_rounding_changes() -> None:
+    model = runs.model(initial=sx.initial.lognormal(0.5, 1.5))
+    text = r"M1 of the lognormal law is 0\.542.*, and 1\.0.*choose a smaller monomer"
+    with pytest.warns(sx.SmoluxWarning, match=text):
+        ds = sx.simulate(model, [0.1], method=QUICK[0], particles=100, replicas=2, seed=1)
+    with pytest.warns(sx.SmoluxWarning, match=text):
+        solved = sx.solve(model, [0.1], tolerance=1e-3)
+    assert sx.results.warnings(ds) == sx.results.warnings(solved) == model.initial.remarks
+    case = parse(
+        '[kernel]\nname = "constant"\n[run]\ntimes = [1]\n'
+        '[initial]\nname = "lognormal"\nmedian = 0.5\nsigma = 1.5\n'
+    )
+    assert physics_warnings(case) == model.initial.remarks
 
 
 @every_initial

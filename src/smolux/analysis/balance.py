@@ -40,7 +40,7 @@ def mass_balance(ds: xr.Dataset) -> str:
     if "mass_in" not in ds:
         words = "to rounding" if worst < _ROUNDING else f"to {worst:.1e}"
         return f"Mass M1 = {np.nanmean(mass):.6g}, constant {words}."
-    last = int(np.isfinite(mass).any(axis=0).nonzero()[0][-1])
+    last = int(np.flatnonzero(np.isfinite(mass).any(axis=0))[-1])
     left = np.isfinite(mass[:, last])
     start, brought, lost, now = (
         float(column.mean())

@@ -229,8 +229,8 @@ def mean_size(case: Case) -> float:
 
 
 def physics_warnings(case: Case) -> list[str]:
-    """Tell what to beware of, whatever the method: gelation, sizes that are rare."""
-    return [*_gelation(case), *_shares(case)]
+    """Tell what to beware of, whatever the method: rounding, gelation, sizes that are rare."""
+    return [*case.model.initial.remarks, *_gelation(case), *_shares(case)]
 
 
 def negative_rates(case: Case) -> list[str]:

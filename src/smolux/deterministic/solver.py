@@ -245,7 +245,7 @@ class _Run:
         return records
 
     def _warnings(self) -> list[str]:
-        found = list(self.factory.notes)
+        found = [*self.model.initial.remarks, *self.factory.notes]
         tolerance = self.settings.tolerance
         late = [t for t, shot in zip(self.settings.times, self.shots, strict=False)
                 if abs(shot.mass_error) > tolerance]  # fmt: skip

@@ -60,6 +60,11 @@ class Initial:
         """The largest size that is present, or beyond which a share of 1e-16 lies."""
         return int(self.quantile(np.array([_BELOW_ONE]))[0])
 
+    @property
+    def remarks(self) -> list[str]:
+        """What should be known of it; stands among the warnings of every result."""
+        return []
+
     def weighted(self, weights: Callable[[Float], Float]) -> Initial:
         """Return the law whose densities are those of this one times ``weights(sizes)``.
 

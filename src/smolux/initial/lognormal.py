@@ -10,6 +10,11 @@ import numpy as np
 
 from .base import Float, Initial, Int, as_number, check_positive, is_above, refuse
 
+#: change of M1 by rounding to whole sizes, relative, above which a result warns of it
+MASS_CHANGE = 0.01
+#: above this size rounding changes no mass: it is as often up as down
+_ROUNDED = 1 << 16
+
 
 @dataclass(frozen=True)
 class Lognormal(Initial):
@@ -53,6 +58,40 @@ class Lognormal(Initial):
         size = self.median * self.sigma ** special.ndtri(np.asarray(share, float))
         return np.maximum(np.ceil(size - 0.5), 1).astype(np.int64)
 
+    def _mass(self, most: float) -> float:
+        """M1 of what the law has up to a size, before rounding."""
+        from scipy import special
+
+        width = math.log(self.sigma)
+        whole = self.density * self.median * math.exp(width**2 / 2)
+        return whole * float(special.ndtr(math.log(most / self.median) / width - width))
+
+    @property
+    def mass(self) -> tuple[float, float]:
+        """M1 of the law, and of the whole sizes that stand for it."""
+        few = min(self.largest, _ROUNDED)
+        rounded = float(np.diff(self.cumulative(np.arange(few + 1.0))) @ np.arange(1.0, few + 1.0))
+        above = self._mass(self.largest + 0.5) - self._mass(few + 0.5)
+        return self._mass(math.inf), self.density * rounded + above
+
+    @property
+    def remarks(self) -> list[str]:
+        """See `Initial.remarks`."""
+        law, found = self.mass
+        change = found / law - 1
+        if abs(change) <= MASS_CHANGE:
+            return []
+        cut = self._mass(self.largest + 0.5) < (1 - MASS_CHANGE / 2) * law
+        cure = (
+            "most of the mass is in particles too rare to be drawn; take a smaller sigma"
+            if cut
+            else "choose a smaller monomer, so that the law lies above the size 1"
+        )
+        return [
+            f"M1 of the lognormal law is {law:.4g}, and {found:.4g} when it is rounded to whole "
+            f"sizes of at least 1 ({100 * change:+.3g} %): {cure}"
+        ]
+
 
 def lognormal(median: float, sigma: float, density: float = 1.0) -> Lognormal:
     """Sizes lognormally distributed, rounded to whole numbers of at least 1.
@@ -60,7 +99,7 @@ def lognormal(median: float, sigma: float, density: float = 1.0) -> Lognormal:
     A size is a number of monomers, so a mass, not a diameter: an aerosol whose diameters have the
     geometric standard deviation GSD has ``sigma = GSD**3`` here, and ``median`` is the cube of its
     count median diameter over the diameter of a monomer. Rounding changes the moments where much
-    of the law lies near or below one monomer.
+    of the law lies near or below one monomer: if M1 changes by more than 1 %, a warning says so.
 
     Parameters
     ----------
