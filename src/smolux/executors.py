@@ -18,6 +18,7 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import Any
 
 from .errors import InputError, WorkerError
@@ -256,6 +257,18 @@ def _mpi(workers: int | None) -> Any:
             "often by: module load openmpi"
         ) from None
     return MPIPoolExecutor(workers)
+
+
+def check_installed(executor: str) -> None:
+    """Refuse an executor whose package is not there, before anything is opened.
+
+    Raises
+    ------
+    InputError
+    """
+    package = {"dask": "distributed", "mpi": "mpi4py"}.get(executor)
+    if package is not None and find_spec(package) is None:
+        raise InputError(missing(executor, package))
 
 
 def missing(kind: str, package: str) -> str:

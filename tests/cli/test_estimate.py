@@ -5,6 +5,7 @@ import pytest
 
 import smolux
 from shared import KERNEL
+from smolux import executors, plan
 from smolux.case import parse
 from smolux.cli import checking, estimate
 from smolux.errors import InputError
@@ -122,3 +123,53 @@ def test_a_pilot_that_does_not_reach_the_end_says_so(monkeypatch):
     if small.reached < 1:
         assert "extrapolated" in estimate._pilot_warnings(small)[0]
     assert np.isfinite(small.expected_collisions(case('name = "constant"').run))
+
+
+def test_what_can_happen_bounds_the_estimate():
+    """In a fixed volume N particles that merge do so N - 1 times, whatever the end."""
+    run = 'times = [1e8]\nparticles = 1000\npopulation = "{}"\nreplicas = 2'
+    for population in ("fixed-volume", "none"):
+        cost = estimate.estimate(case('name = "constant"', run.format(population)))
+        assert cost.collisions == pytest.approx(2 * 999, rel=0.05)
+        assert cost.collisions <= 2 * 999
+        assert "only about 1 of 1000" in cost.warnings[0]
+
+
+def small_pilot(times, collisions, volume, end, merging=True):
+    ones = np.ones(len(times))
+    return estimate.Pilot(
+        1000, np.array(times), 1 / np.array(volume), np.array(collisions), 1000 * np.array(volume),
+        ones, 1e-7, end, merging,
+    )  # fmt: skip
+
+
+def test_a_short_pilot_is_gone_on_with_as_it_grew():
+    """Not in proportion to time: doublings, of 500 events each, come ever more slowly."""
+    times = [0.0, 1.0, 10.0, 100.0, 1000.0]
+    late = small_pilot(times, [0, 500, 1000, 1500, 2000], [1.0, 2, 4, 8, 16], 1e8)
+    doubling = case('name = "constant"', "times = [1e8]\nparticles = 1000").run
+    assert 4500 <= late.expected_collisions(doubling) < 10_000
+    steady = small_pilot(times, [0, 1, 10, 100, 1000], [1.0] * 5, 1e8, merging=False)
+    assert steady.expected_collisions(doubling) == pytest.approx(1e8)
+    fixed = case(
+        'name = "constant"', 'times = [1e8]\nparticles = 1000\npopulation = "fixed-volume"'
+    ).run
+    assert late.expected_collisions(fixed) <= 999
+    assert steady.expected_collisions(fixed) == pytest.approx(1e8)
+
+
+def test_what_a_run_refuses_the_check_refuses(monkeypatch):
+    monkeypatch.setattr(plan, "available_memory", lambda: 1e9)
+    many = case('name = "constant"', "times = [1]\nparticles = 1e9")
+    with pytest.raises(InputError, match=r"case\.toml: the run needs about .* GB") as caught:
+        checking.text(many, "case.toml")
+    with pytest.raises(InputError) as refused:
+        smolux.simulate(many.model, **many.run.arguments())
+    assert caught.value.problems == [f"case.toml: {p}" for p in refused.value.problems]
+    rest = '[solve]\ntimes = [1]\ngel = "reacts"\n[[processes]]\nname = "shattering"\nrate = 1\n'
+    solved = parse(f'[kernel]\nname = "constant"\n{rest}')
+    with pytest.raises(InputError, match="for aggregation alone"):
+        checking.text(solved, "case.toml")
+    monkeypatch.setattr(executors, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match="needs distributed, which is not installed"):
+        checking.text(case('name = "constant"', rest='[parallel]\nexecutor = "dask"'), "case.toml")

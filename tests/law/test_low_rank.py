@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 
 import smolux as sx
+from shared import extinction
 from smolux import exact
 from smolux.core.state import TRIALS
 from smolux.kernels import Kernel, Majorant
 from smolux.kernels.formula_kernel import FormulaKernel
 from smolux.plan import make_plan
 from smolux.replicas import Group
+
+pytestmark = extinction
 
 #: every size from 2 on lies in the pool, two and more sizes to a slot
 WIDE = sx.methods.LowRank(bits=0)

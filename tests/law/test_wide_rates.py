@@ -14,6 +14,9 @@ from smolux.core.state import TRIALS
 from smolux.methods import METHODS
 from smolux.plan import make_plan
 from smolux.replicas import Group
+from shared import extinction
+
+pytestmark = extinction
 
 END = 1e12
 

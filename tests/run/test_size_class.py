@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import smolux as sx
+from shared import extinction
 from smolux.methods.size_class import SizeClass
 
 #: one law for many kernels: far from low rank, a narrow ridge, with zeros, gelling
@@ -65,6 +66,7 @@ def test_kernels_far_from_low_rank_follow_the_rate_equations(name: str, classes:
     assert (mass == np.rint(mass)).all()
 
 
+@extinction
 @pytest.mark.parametrize("particles", [2, 3, 17, 1000])
 def test_few_particles_end_as_one_cluster(particles: int) -> None:
     ds = sx.simulate(

@@ -78,6 +78,13 @@ class Case:
         assert settings is not None
         return settings.times
 
+    def solve_arguments(self) -> dict[str, Any]:
+        """Return the arguments of `smolux.solve`: what is observed is that of a simulation."""
+        assert self.solve is not None
+        like = self.run or Run
+        shared = ("orders", "sizes", "bins_per_octave")
+        return self.solve.arguments() | {name: getattr(like, name) for name in shared}
+
     def with_seed(self) -> Case:
         """Return the case with a seed: its own, or a new one."""
         if self.run is None or self.run.seed is not None:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from ..case import Case, Parallel, Run
 from ..case.physics import model_tables
 from ..case.settings import as_table
 from ..case.write import value
+from ..deterministic.arguments import check as solver_settings
 from ..errors import InputError
+from ..executors import check_installed
+from ..plan import make_plan
 from ..resources import cores
 from .console import amount, duration
 from .estimate import estimate, negative_rates, physics_warnings
@@ -23,7 +27,7 @@ def text(case: Case, source: str) -> str:
     InputError
         For mistakes that only a look at the whole case finds.
     """
-    wrong = negative_rates(case)
+    wrong = negative_rates(case) or refusals(case)
     if wrong:
         raise InputError([f"{source}: {w}" for w in wrong])
     lines = [f"{source} is valid.", "", *description(case), ""]
@@ -41,6 +45,23 @@ def text(case: Case, source: str) -> str:
         ]
     lines += ["", *(f"warning: {w}" for w in warnings)] if warnings else ["", "No warnings."]
     return "\n".join(lines)
+
+
+def refusals(case: Case) -> list[str]:
+    """Find what a run of the case would refuse before it begins, such as for want of memory."""
+    plans: list[Callable[[], object]] = [partial(check_installed, case.parallel.executor)]
+    if case.run is not None:
+        plans.append(partial(make_plan, case.model, **case.run.arguments()))
+    if case.solve is not None:
+        settings = {"largest": None, "max_size": None} | case.solve_arguments()
+        plans.append(partial(solver_settings, case.model, **settings))
+    found = []
+    for plan in plans:
+        try:
+            plan()
+        except InputError as error:
+            found += error.problems
+    return found
 
 
 def description(case: Case) -> list[str]:

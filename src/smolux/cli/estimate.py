@@ -19,6 +19,7 @@ from ..methods import METHODS, SizeClass
 from ..methods.base import Method
 from ..pilot import settled
 from ..plan import make_plan
+from ..population import doubles_at
 from ..processes import Aggregation, Removal, Source
 from ..resources import available_memory, cores
 from ..room import amount
@@ -32,6 +33,10 @@ _SEED = 20_240_229
 _FEW = 100.0
 #: particles for each one at the start, that breakage may make, from which on that is told
 _MANY = 10.0
+
+
+def _doubles(run: Run) -> bool:
+    return doubles_at(run.population, run.particles) > 0
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,8 @@ class Pilot:
         On one core.
     end : float
         The last output time of the case.
+    merging : bool
+        Whether all that happens is that two particles become one.
     """
 
     particles: int
@@ -58,6 +65,7 @@ class Pilot:
     largest: Float
     seconds_per_collision: float
     end: float
+    merging: bool
 
     @property
     def reached(self) -> float:
@@ -66,13 +74,25 @@ class Pilot:
 
     def expected_collisions(self, run: Run) -> float:
         """Collisions of one replica of the case, extrapolated if the pilot is short."""
-        scale = run.particles / self.particles
-        if run.population == "fixed-volume":
-            steps = np.diff(self.collisions, prepend=0.0)
-            total = float(np.sum(steps * self.volume[0] / self.volume)) * scale
-        else:
-            total = float(self.collisions[-1]) * scale
-        return total / max(self.reached, 1e-9)
+        so_far, most = self.collisions, np.inf
+        if not _doubles(run):
+            share = self.volume[0] / self.volume
+            # within a step the volume may double, and again
+            between = np.sqrt(share * np.concatenate((share[:1], share[:-1])))
+            so_far = np.cumsum(np.diff(self.collisions, prepend=0.0) * between)
+            if self.merging:  # down to one particle, and no further
+                most = run.particles - 1.0
+        return min(self._at_the_end(so_far) * run.particles / self.particles, most)
+
+    def _at_the_end(self, so_far: Float) -> float:
+        """Go on by the power of time with which a number has grown in the last decade."""
+        last, reached = float(so_far[-1]), self.times[-1]
+        before = np.searchsorted(self.times, reached / 10.0)
+        if self.reached >= 1 or not so_far[before] > 0.0:
+            return last / max(self.reached, 1e-9)
+        ratios = last / so_far[before], reached / self.times[before]
+        power = float(np.log(ratios[0]) / np.log(ratios[1])) if ratios[1] > 1 else 1.0
+        return last * (self.end / reached) ** power
 
     def fewest(self, run: Run) -> float:
         """Particles of one replica of the case where they are fewest, were the volume fixed."""
@@ -82,7 +102,7 @@ class Pilot:
 
     def growth(self, run: Run) -> float:
         """Most particles of one replica over those at its start."""
-        volume = self.volume if run.population == "doubling" else self.volume[0]
+        volume = self.volume if _doubles(run) else self.volume[0]
         return float(max(1.0, np.max(self.number_density * volume) / self.particles))
 
 
@@ -127,7 +147,8 @@ def _once(case: Case, particles: int, weighting: Any) -> tuple[Any, bool]:
     run = case.run
     assert run is not None
     end = run.times[-1]
-    times = np.union1d(np.linspace(0, end, 49), end * np.geomspace(1e-6, 1, 49))
+    # the first far below what linear steps see: particles that merge do so early
+    times = np.union1d(np.linspace(0, end, 49), end * np.geomspace(1e-12, 1, 145))
     started: list[float] = []
 
     def halt(progress: Any) -> None:
@@ -151,12 +172,16 @@ def pilot(case: Case) -> Pilot:
     """Run a case with few particles, more of them as long as that takes next to no time."""
     assert case.run is not None
     particles, weighting = min(_FIRST, case.run.particles), weighted(case)
+    again = False
     while True:
         ds, done = _once(case, particles, weighting)
         seconds = float(ds.attrs["compute_seconds"])
-        if not done or seconds > _SHORT or particles == case.run.particles:
+        if done and seconds <= _SHORT and particles < case.run.particles:
+            particles, again = min(8 * particles, case.run.particles), False
+        elif again or seconds <= _SHORT:
             break
-        particles = min(8 * particles, case.run.particles)
+        else:  # bounds that the first one had to find are known to the second
+            again = True
     first = ds.isel(replica=0)
     seen = np.isfinite(first["number_density"].values)
     events = max(float(ds.attrs["events"]), 1.0)
@@ -167,6 +192,7 @@ def pilot(case: Case) -> Pilot:
     return Pilot(
         particles, first["time"].values[seen], **values,
         seconds_per_collision=seconds / events, end=case.run.times[-1],
+        merging=all(isinstance(p, Aggregation) for p in case.model.processes),
     )  # fmt: skip
 
 
@@ -308,15 +334,15 @@ def _shares(case: Case) -> list[str]:
 def _population_warnings(run: Run, small: Pilot) -> list[str]:
     found = []
     fewest = small.fewest(run)
-    if run.population == "fixed-volume" and fewest < _FEW:
+    if not _doubles(run) and fewest < _FEW:
         what = (
             "everything becomes one cluster (extinction)"
             if fewest < 2
             else "replicas may end as one cluster (extinction)"
         )
         found.append(
-            f"without doubling only about {fewest:.3g} of {run.particles} particles are left where "
-            f'they are fewest: {what}; use more particles, or population = "doubling"'
+            f"without doubling only about {max(fewest, 1):.3g} of {run.particles} particles are "
+            f'left where they are fewest: {what}; use more particles, or population = "doubling"'
         )
     growth = small.growth(run)
     if growth > 4:

@@ -14,6 +14,7 @@ from .. import plotting, results, spatial
 from ..case import spatial as cases
 from ..case.spatial import FIGURES, SpatialCase
 from ..errors import InputError, Interrupted, did_you_mean, quiet
+from ..spatial.running import checked
 from . import rundir
 from .console import amount, duration, say
 from .progress import Display
@@ -192,9 +193,10 @@ def described(case: cases.SpatialCase, source: str) -> str:
     Raises
     ------
     InputError
-        If they do not.
+        If they do not, or for what a run would refuse.
     """
     system = case.with_seed().run.system()
+    checked(system, progress=None, **case.run.arguments())
     run_ = case.run
     memory = 450 * len(system)
     lines = [

@@ -258,14 +258,7 @@ def _computed(case: Case, directory: RunDirectory, progress: Display) -> Any:
 
 
 def _solve(case: Case, file: Path, display: Callable[..., Display]) -> Any:
-    assert case.solve is not None
-    settings = case.solve.arguments()
-    if case.run is not None:
-        settings |= {
-            "orders": case.run.orders,
-            "sizes": case.run.sizes,
-            "bins_per_octave": case.run.bins_per_octave,
-        }
+    settings = case.solve_arguments()
     with display(what="solving") as progress:
         ds = solve(case.model, **settings, progress=progress)
     _store(ds, case, file)
