@@ -10,7 +10,7 @@ from .errors import InputError
 from .initial import Initial, monodisperse
 from .kernels.base import Kernel
 from .processes import Aggregation, Removal, Source
-from .processes.base import Process
+from .processes.base import PairProcess, Process
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Model:
     Parameters
     ----------
     kernel : Kernel
-        The collision rate, see `smolux.kernels`.
+        The collision rate, see `smolux.kernels`; ``kernels.Constant(0)`` if nothing collides.
     processes : sequence of Process
         What happens to pairs, to single particles, and from outside, see `smolux.processes`;
         aggregation alone if left out. They are kept in this order.
@@ -73,6 +73,13 @@ class Model:
             problems = _open_problems(processes, self.initial)
         if not problems:
             problems = self.kernel.problems(self.initial.largest)
+        alone = any(not isinstance(p, PairProcess) for p in processes)
+        if not problems and self.kernel.vanishes and not alone:
+            problems = [
+                f"kernel {self.kernel.label}: is zero: nothing would ever happen, as "
+                f"{' and '.join(names)} take two particles: give a rate above zero, or processes "
+                "of single particles"
+            ]
         if problems:
             raise InputError(problems)
 

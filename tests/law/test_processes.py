@@ -8,6 +8,7 @@ as weight; what is not wanted has a rate of next to nothing. Small systems with 
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ import pytest
 from scipy import integrate
 
 import smolux as sx
+from shared import FORMULA
 from smolux import case as cases
 from smolux.deterministic import steady_state
 from smolux.errors import InputError
@@ -333,3 +335,60 @@ def test_case_file() -> None:
     assert cases.parse(case.to_toml()) == case
     with pytest.raises(InputError, match="formula in k"):
         cases.parse(text.replace("[0, 1, 0.5]", "{ a = 1 }"))
+
+
+# --- without encounters --------------------------------------------------------------------------
+
+ZEROS = {
+    "constant": sx.kernels.Constant(0),
+    "formula": sx.kernels.formula("0"),
+    "parameter": sx.kernels.formula("a*(i + j)", a=0.0),
+    "function": sx.kernels.from_function(lambda i, j: 0.0 * i * j),
+}
+
+
+@pytest.mark.parametrize(
+    "method",
+    [
+        pytest.param(m.name, marks=() if m.name == "acceptance-rejection" else pytest.mark.slow)
+        for m in sx.methods.METHODS
+    ],
+)
+def test_particles_that_never_meet(method: str) -> None:
+    """Each is there at t with the probability exp(-r t), and what a source brings is J t."""
+    laws_of_all = sx.kernels.formula(FORMULA, c0=0.0, c1=0.0, c2=0.0, c3=0.0)
+    model = replace(everything(removal=0.3), kernel=laws_of_all)
+    ds = simulated(model, TIMES, 51, method=method)
+    laws.agree(ds["number_density"].values, np.exp(-0.3 * np.array(TIMES)), method)
+    assert (ds["collisions"] == 0).all()
+    model = replace(everything(source=1.0, initial=sx.initial.empty()), kernel=laws_of_all)
+    ds = simulated(model, [3.0], 52, method=method)
+    brought = 3.0 + 0.5 * (1 - np.cos(9.0)) / 3
+    laws.agree(ds["number_density"].values[:, 0], 1.2 * brought, method)
+
+
+@pytest.mark.parametrize("kernel", ZEROS.values(), ids=ZEROS)
+def test_a_kernel_that_is_zero(kernel: Any) -> None:
+    assert kernel.vanishes
+    with pytest.raises(InputError, match="nothing would ever happen, as aggregation take"):
+        sx.Model(kernel)
+    with pytest.raises(InputError, match="aggregation and shattering take two particles"):
+        sx.Model(kernel, [P.Aggregation(), P.Shattering(0.1)])
+    model = sx.Model(kernel, [P.Aggregation(), P.Removal(0.5)])
+    ds = sx.solve(model, [1.0, 2.0])
+    np.testing.assert_allclose(ds["number_density"][0], np.exp([-0.5, -1.0]), rtol=1e-6)
+
+
+def test_a_case_without_encounters() -> None:
+    case = cases.parse(
+        '[kernel]\nname = "constant"\nscale = 0\n[[processes]]\nname = "removal"\nrate = 0.5\n'
+        "[run]\ntimes = [1]\n"
+    )
+    assert case.model == sx.Model(sx.kernels.Constant(0), [P.Removal(0.5)])
+    assert cases.parse(case.to_toml()) == case
+
+
+def test_other_kernels_do_not_vanish() -> None:
+    for law in (sx.kernels.Constant(1e-300), sx.kernels.Ballistic(), sx.kernels.formula("1/i/j")):
+        assert not law.vanishes
+    assert not sx.kernels.from_function(lambda i, j: 1.0 if i + j == 7 else 0.0).vanishes

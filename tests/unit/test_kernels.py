@@ -278,8 +278,8 @@ def test_sedimentation_in_si_units() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: kernels.Constant(-1.0), ["'constant': scale = -1.0: must be positive"]),
-        (lambda: kernels.Constant(0), ["scale = 0: must be positive"]),
+        (lambda: kernels.Constant(-1.0), ["'constant': scale = -1.0: must be zero or more"]),
+        (lambda: kernels.Additive(0), ["scale = 0: must be positive"]),
         (
             lambda: kernels.Bilinear(-1, math.nan),
             ["A = -1: must be from 0", "B = nan: must be"],

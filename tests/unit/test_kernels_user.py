@@ -187,7 +187,7 @@ def raising(i: float, j: float) -> float:
         (raising, ["K(255, 512) = inf", "limit what grows"]),
         (lambda i, j: 1 / (i - j) ** 2, ["K(1, 1) = inf", "division by zero"]),
         (lambda i, j: "x", ["K(1, 1) raises ValueError", "correct the function"]),
-        (lambda i, j: 0.0, ["zero for every pair"]),
+        (lambda i, j: 1.0 if i * j == 0.5 else 0.0, ["zero for every pair", "Constant(0)"]),
         (lambda i, j: (i - j) ** 0.5, ["K(1, 2) = nan"]),
     ],
 )

@@ -20,6 +20,8 @@ Float = NDArray[np.float64]
 #: Boltzmann constant in J/K, exact in the SI
 BOLTZMANN = 1.380649e-23
 
+#: sizes are not larger
+LARGEST = 2.0**62
 #: bounds are widened by this share, so that rounding, which differs between NumPy and compiled
 #: code, never breaks them
 _ROUNDING = 1e-13
@@ -127,7 +129,10 @@ class Kernel:
 
         Only exact, finite-rank laws answer; for others the solver finds a cross approximation.
         """
-        return None
+        if not self.vanishes:
+            return None
+        none = np.zeros((1, len(sizes)))
+        return none, none
 
     def majorant(self) -> Majorant | None:
         """Return a majorant of low rank that holds for all sizes from 1 on; None if none is known.
@@ -135,6 +140,13 @@ class Kernel:
         Methods that need one then find one from `bounds`.
         """
         return None
+
+    @property
+    def vanishes(self) -> bool:
+        """Whether the law is zero for all sizes, which is proved: nothing collides."""
+        if not self.rigorous:
+            return False
+        return bool(np.max(self.bounds(1.0, LARGEST, 1.0, LARGEST)[1]) == 0.0)
 
     @property
     def singled_out(self) -> Float:
@@ -173,13 +185,15 @@ class Kernel:
         }
 
 
-def check_parameters(kernel: Kernel, **ranges: tuple[float, float]) -> None:
+def check_parameters(kernel: Kernel, zero: bool = False, **ranges: tuple[float, float]) -> None:
     """Check that parameters are finite numbers within their ranges, and the scale is positive.
 
     Parameters
     ----------
     kernel : Kernel
         Its fields are checked.
+    zero : bool
+        Whether the scale may be zero.
     **ranges : (float, float)
         The closed range of a parameter; a parameter without one may have any finite value.
 
@@ -196,8 +210,8 @@ def check_parameters(kernel: Kernel, **ranges: tuple[float, float]) -> None:
             problems.append(f"{where}: must be a number")
         elif not np.isfinite(value):
             problems.append(f"{where}: must be a finite number")
-        elif f.name == "scale" and value <= 0:
-            problems.append(f"{where}: must be positive")
+        elif f.name == "scale" and not (value > 0 or (zero and value == 0)):
+            problems.append(f"{where}: must be {'zero or more' if zero else 'positive'}")
         elif f.name in ranges and not ranges[f.name][0] <= value <= ranges[f.name][1]:
             low, high = ranges[f.name]
             limits = f"from {low:g} to {high:g}" if high < np.inf else f"at least {low:g}"

@@ -71,9 +71,10 @@ def law_problems(kernel: Kernel, largest: float) -> list[str]:
             f"not symmetric, as K({j[first]:.0f}, {i[first]:.0f}) = {mirrored[first]:.6g}; "
             "a pair has no order: take for example the mean of both",
         )
-    if finite.all() and not values.any():
+    if finite.all() and not values.any() and not kernel.vanishes:
         problems.append(
-            f"{where}: is zero for every pair of the sample: nothing would ever collide"
+            f"{where}: is zero for every pair of the sample: nothing would ever collide; if that "
+            "is meant, take smolux.kernels.Constant(0)"
         )
     return problems or _declared(kernel, where, sizes, values, i, j)
 

@@ -24,7 +24,8 @@ class Constant(Kernel):
     Parameters
     ----------
     scale : float
-        The rate, volume per time.
+        The rate, volume per time. Zero for models in which nothing collides, but single particles
+        change, leave or come in.
 
     References
     ----------
@@ -40,7 +41,7 @@ class Constant(Kernel):
     rate: ClassVar[Callable[..., Any]] = staticmethod(_rate)
 
     def __post_init__(self) -> None:
-        check_parameters(self)
+        check_parameters(self, zero=True)
 
     @property
     def degree(self) -> float:
