@@ -10,9 +10,9 @@ from matplotlib.ticker import MaxNLocator
 from smolux.analysis.compare import compare
 from smolux.analysis.reference import is_deterministic
 
-from .curves import Look, Reference, crowded, described, draw, handle, resolve
-from .series import draw_reference, reference_handle, set_axes
-from .style import Width, legend_above, new_figure, quantity, styled, use_linear, use_log
+from .curves import Look, Reference, crowded, described, draw, drawn_as, resolve
+from .series import draw_reference, label_time, reference_handle, set_axes
+from .style import Width, label_axis, legend_above, new_figure, styled, use_linear, use_log
 
 
 @styled
@@ -49,23 +49,26 @@ def clusters(ds: xr.Dataset, *, reference: Reference = "exact", width: Width = "
     values = ds["number_density"].transpose("replica", "time").values
     log_time = set_axes(top, ds, values)
     drawn = draw_reference(top, ds, found, "number_density", log_time, "black")
-    draw(top, ds, ds["time"].values, values, Look.number(0), zorder=3)
-    top.set_ylabel(quantity("number density $M_0$", ds["number_density"].attrs.get("units")))
-    handles = [handle(ds, described(ds), Look.number(0))]
-    legend_above(top, [*handles, reference_handle(ds, name, "black")] if drawn else handles)
-    if sigmas is not None:
-        top.set_xlabel("")
+    draw(top, ds, values, Look.number(0), zorder=3)
+    label_axis(top, "y", "number density $M_0$", ds["number_density"].attrs.get("units"))
+    handles = [drawn_as(ds, described(ds), Look.number(0), log_time)]
+    if drawn:
+        handles.append(reference_handle(ds, found, name, "black", log_time))
+    legend_above(top, handles)
+    if sigmas is None:
+        label_time(top, ds)
+    else:
         (use_log if log_time else use_linear)(bottom, "x")
         z = np.clip(sigmas.values, -99, 99)
         bottom.axhspan(-2, 2, color="0.9", lw=0)
         bottom.axhline(0, color="black", lw=0.6)
         look = Look.number(0)
-        size = 1.8 if crowded(ds) else 3.2
+        size = 1.8 if crowded(ds, log_time) else 3.2
         bottom.plot(sigmas["time"].values, z, ls="none", marker="o", ms=size, color=look.colour)
         limit = 1.15 * max(3.0, float(np.nanmax(np.abs(z))))
         bottom.set_ylim(-limit, limit)
         bottom.yaxis.set_major_locator(MaxNLocator(5, integer=True, steps=[1, 2, 5, 10]))
         use_linear(bottom, "y")
         bottom.set_ylabel(r"deviation ($\sigma$)")
-        bottom.set_xlabel(quantity("time $t$", ds["time"].attrs.get("units")))
+        label_time(bottom, ds)
     return figure

@@ -18,9 +18,9 @@ from smolux.analysis.select import matches, series
 from smolux.analysis.statistics import over_replicas, quantile
 from smolux.errors import InputError
 
-from .curves import Look, draw, draw_line, draw_points, handle
-from .series import draw_reference, name_of, set_axes
-from .style import Width, legend_above, new_figure, quantity, styled, use_linear, use_log
+from .curves import Look, draw, draw_line, draw_points, drawn_as
+from .series import draw_reference, label_time, name_of, set_axes
+from .style import Width, label_axis, legend_above, new_figure, styled, use_linear, use_log
 
 Float = NDArray[np.float64]
 
@@ -136,8 +136,8 @@ def comparison(
         layer = 2 if is_deterministic(ds) else 3
         later = len(simulated) - 1 - simulated.index(label) if layer == 3 else 0
         ring = {"ms": 3.2 + 1.8 * later} if later else {}
-        draw(top, ds, ds["time"].values, curves[label].values, looks[label], zorder=layer, **ring)
-        handles.append(handle(ds, label, looks[label]))
+        draw(top, ds, curves[label].values, looks[label], zorder=layer, **ring)
+        handles.append(drawn_as(ds, label, looks[label], log_time))
     others = [label for label in results if label != name]
     for k, label in enumerate(others):
         shift = k - (len(others) - 1) / 2
@@ -146,9 +146,8 @@ def comparison(
     bottom.axhline(0, color="black", lw=0.6, zorder=1)
     use_linear(bottom, "y")
     label = name_of(variable, order, size)
-    top.set_ylabel(quantity(label, first[variable].attrs.get("units")))
-    top.set_xlabel("")
-    bottom.set_xlabel(quantity("time $t$", first["time"].attrs.get("units")))
-    bottom.set_ylabel("deviation (%)")
+    label_axis(top, "y", label, first[variable].attrs.get("units"))
+    label_time(bottom, first)
+    label_axis(bottom, "y", "deviation", "%")
     legend_above(top, handles)
     return figure

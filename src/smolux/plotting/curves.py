@@ -16,7 +16,7 @@ from smolux.analysis.reference import is_deterministic, solution_of
 from smolux.analysis.statistics import over_replicas, quantile
 from smolux.errors import InputError
 
-from .style import GREY, MARKERS, PALETTE
+from .style import MARKERS, PALETTE
 
 Float = NDArray[np.float64]
 Reference = xr.Dataset | Literal["exact"] | None
@@ -104,44 +104,67 @@ def draw_points(
         ax.plot(x[~known], mean[~known], mfc="white", **style)
 
 
-def draw_line(ax: Axes, x: Float, y: Float, colour: str, style: str = "-", **options: Any) -> None:
+def draw_line(ax: Axes, x: Float, y: Float, colour: str, **options: Any) -> None:
     """Draw a deterministic result as a line, where it is finite."""
     shown = np.isfinite(y) & np.isfinite(x)
     shown &= (y > 0) if ax.get_yscale() == "log" else True
     shown &= (x > 0) if ax.get_xscale() == "log" else True
-    ax.plot(np.where(shown, x, np.nan), np.where(shown, y, np.nan), style, color=colour, **options)
+    ax.plot(np.where(shown, x, np.nan), np.where(shown, y, np.nan), color=colour, **options)
 
 
-def draw_solver(ax: Axes, t: Float, y: Float, colour: str, **options: Any) -> None:
-    """Draw a solver's time series: a line, and where its points are few, they are shown on it."""
-    few = int(np.isfinite(y).sum()) < _FEW
-    draw_line(
-        ax, t, y, colour, ".-" if few else "-", **{"ms": 3.0, "lw": 0.7 if few else 1.0} | options
-    )
+def _solver_style(ds: xr.Dataset, log: bool) -> dict[str, Any]:
+    """Return how a solver's time series looks: a line, with its points where they are few."""
+    few = _drawn(ds, log) < _FEW
+    return {"ls": "-", "marker": "." if few else "", "ms": 3.0, "lw": 0.7 if few else 1.0}
 
 
-def draw(ax: Axes, ds: xr.Dataset, x: Float, values: Float, look: Look, **options: Any) -> None:
-    """Draw values of shape (R, P) of a result: simulated ones as dots, others as a line."""
+def solver_handle(ds: xr.Dataset, label: str, colour: str, log: bool) -> Artist:
+    """Legend entry of what `draw_solver` draws."""
+    return Line2D([], [], color=colour, label=label, **_solver_style(ds, log))
+
+
+def draw_solver(ax: Axes, ds: xr.Dataset, y: Float, colour: str, **options: Any) -> None:
+    """Draw a solver's time series."""
+    style = _solver_style(ds, ax.get_xscale() == "log")
+    draw_line(ax, ds["time"].values, y, colour, **style | options)
+
+
+def draw(ax: Axes, ds: xr.Dataset, values: Float, look: Look, **options: Any) -> None:
+    """Draw a time series of shape (R, T) of a result, simulated or solved; see `drawn_as`."""
     if is_deterministic(ds):
-        draw_solver(ax, x, values[0], look.colour, **options)
+        draw_solver(ax, ds, values[0], look.colour, **options)
     else:
-        draw_values(ax, x, values, look, **options)
+        line = crowded(ds, ax.get_xscale() == "log")
+        draw_values(ax, ds["time"].values, values, look, line=line, **options)
 
 
-def handle(
-    ds: xr.Dataset, label: str, look: Look | None = None, *, line: bool | None = None
-) -> Artist:
-    """Legend entry of a result; `line` as in `draw_values`, by the number of times if left out."""
-    look = look or Look(GREY, "o")
-    if is_deterministic(ds) or (crowded(ds) if line is None else line):
+def drawn_as(ds: xr.Dataset, label: str, look: Look, log: bool) -> Artist:
+    """Legend entry of a time series that `draw` draws, on an axis of time that may be logarithmic.
+
+    Simulated results are dots, or a line with a band where they are many; solved ones a line.
+    """
+    if is_deterministic(ds):
+        return solver_handle(ds, label, look.colour, log)
+    return handle(ds, label, look, line=crowded(ds, log))
+
+
+def handle(ds: xr.Dataset, label: str, look: Look, *, line: bool) -> Artist:
+    """Legend entry of a result that is drawn as a line or, if it is simulated, as dots."""
+    if is_deterministic(ds) or line:
         return Line2D([], [], color=look.colour, label=label)
     fill = "none" if look.hollow or ds.sizes["replica"] == 1 else look.colour
     return Line2D([], [], color=look.colour, marker=look.marker, mfc=fill, ls="none", label=label)
 
 
-def crowded(ds: xr.Dataset) -> bool:
+def _drawn(ds: xr.Dataset, log: bool) -> int:
+    """How many times of a result have a place on an axis."""
+    shown = ds["number_density"].notnull().any("replica").values
+    return int(np.sum(shown & (ds["time"].values > 0.0) if log else shown))
+
+
+def crowded(ds: xr.Dataset, log: bool) -> bool:
     """Whether the times of a simulation are so many that it is drawn as a line with a band."""
-    return not is_deterministic(ds) and ds.sizes["time"] > _CROWDED
+    return not is_deterministic(ds) and _drawn(ds, log) > _CROWDED
 
 
 def described(ds: xr.Dataset) -> str:

@@ -204,13 +204,16 @@ def size_distribution(
     if not positive.size:
         raise InputError("size_distribution: the result has no clusters at these times")
     top = float(positive.max())
-    bottom = max(float(positive.min()), top * 10.0**-decades)
+    least = min(float(np.nanmax(m)) for m in means if np.any(m > 0))  # each time is to be seen
+    bottom = max(float(positive.min()), min(top * 10.0**-decades, least / 10))
     largest = max(
         float(np.max(t.upper[np.isfinite(t.upper) & (m >= bottom)], initial=1.0))
         for t, m in zip(tables, means, strict=True)
     )
     drawn, handles = False, list[Artist]()
-    for k, (time, table) in enumerate(zip(chosen, tables, strict=True)):
+    for k, (time, table, mean) in enumerate(zip(chosen, tables, means, strict=True)):
+        if not np.any(mean > 0):
+            continue  # nothing is there any more
         look = Look.number(k)
         drawn |= _reference(ax, ds, found, time, 2 * largest, look.colour)
         if is_deterministic(ds):

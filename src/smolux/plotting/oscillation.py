@@ -17,8 +17,8 @@ from smolux.analysis.reference import is_deterministic
 from smolux.analysis.select import series
 
 from .curves import described
-from .series import name_of
-from .style import PALETTE, Width, legend_above, new_figure, quantity, styled, use_linear
+from .series import label_time, name_of
+from .style import PALETTE, Width, label_axis, legend_above, new_figure, styled, use_linear
 
 Float = NDArray[np.float64]
 
@@ -99,14 +99,14 @@ def oscillations(
     mark: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 2.6, "zorder": 4}
     mark |= {"mfc": "white", "color": PALETTE[1]}
     left.plot(at.ravel(), value.ravel(), **mark)
-    label = quantity(name_of(variable, order, size), ds[variable].attrs.get("units"))
-    left.set(xlabel=quantity("time $t$", ds["time"].attrs.get("units")), ylabel=label)
-    right.set(xlabel=quantity(name_of(against, order, size), ds[against].attrs.get("units")))
-    right.set_ylabel(label)
     for ax in (left, right):
         use_linear(ax, "x")
         use_linear(ax, "y")
-    handles.append(Line2D([], [], label=_caption(found), **mark))
+        label_axis(ax, "y", name_of(variable, order, size), ds[variable].attrs.get("units"))
+    label_time(left, ds)
+    label_axis(right, "x", name_of(against, order, size), ds[against].attrs.get("units"))
+    if np.isfinite(value).any():
+        handles.append(Line2D([], [], label=_caption(found), **mark))
     legend_above(left, handles, spans=True)
     return figure
 

@@ -26,17 +26,18 @@ from .curves import (
     draw,
     draw_line,
     draw_solver,
+    drawn_as,
     fine_times,
-    handle,
     resolve,
+    solver_handle,
 )
 from .style import (
     GREY,
     Width,
     axes_of,
+    label_axis,
     legend_above,
     prefers_log,
-    quantity,
     root_of,
     styled,
     use_linear,
@@ -67,13 +68,19 @@ def name_of(variable: str, order: float = 2.0, size: int = 1, process: str = "")
 
 
 def set_axes(ax: Axes, ds: xr.Dataset, values: np.ndarray, log: bool | None = None) -> bool:
-    """Choose scales for time and values; return whether time is logarithmic."""
+    """Choose scales for time and values, before anything is drawn; say if time is logarithmic."""
     times = ds["time"].values
     log_time = prefers_log(times)
     for which, chosen in (("x", log_time), ("y", prefers_log(values) if log is None else log)):
         (use_log if chosen else use_linear)(ax, which)  # type: ignore[arg-type]
-    ax.set_xlabel(quantity("time $t$", ds["time"].attrs.get("units")))
     return log_time
+
+
+def label_time(ax: Axes, ds: xr.Dataset) -> None:
+    """Label the axis of time, when all is drawn, and say if the start has no place on it."""
+    label_axis(ax, "x", "time $t$", ds["time"].attrs.get("units"))
+    if ax.get_xscale() == "log" and np.any(ds["time"].values == 0.0):
+        ax.set_xlabel(f"{ax.get_xlabel()}, without $t = 0$")
 
 
 def _exact_values(
@@ -113,19 +120,23 @@ def draw_reference(
     else:
         times = fine_times(ds, log_time)
         values = _exact_values(ds, reference, times, variable, which)
-    if isinstance(reference, xr.Dataset) and not crowded(ds):
-        draw_solver(ax, times, values, colour, zorder=1)
-    elif crowded(ds):
-        draw_line(ax, times, values, "black", "--", lw=0.8, zorder=4)
+    if isinstance(reference, xr.Dataset) and not crowded(ds, log_time):
+        draw_solver(ax, reference, values, colour, zorder=1)
+    elif crowded(ds, log_time):
+        draw_line(ax, times, values, "black", ls="--", lw=0.8, zorder=4)
     else:
         draw_line(ax, times, values, colour, zorder=1)
     return bool(np.isfinite(values).any())
 
 
-def reference_handle(ds: xr.Dataset, name: str, colour: str) -> Artist:
+def reference_handle(
+    ds: xr.Dataset, reference: Any, name: str, colour: str, log_time: bool
+) -> Artist:
     """Legend entry of the reference, drawn as `draw_reference` does."""
-    if crowded(ds):
+    if crowded(ds, log_time):
         return Line2D([], [], color="black", ls="--", lw=0.8, label=name)
+    if isinstance(reference, xr.Dataset):
+        return solver_handle(reference, name, colour, log_time)
     return Line2D([], [], color=colour, label=name)
 
 
@@ -177,11 +188,14 @@ def time_series(
     log_time = set_axes(ax, ds, curve.values, log)
     found, name = resolve(ds, reference)
     drawn = draw_reference(ax, ds, found, variable, log_time, "black", **which)
-    draw(ax, ds, ds["time"].values, curve.values, Look.number(0), zorder=3)
+    draw(ax, ds, curve.values, Look.number(0), zorder=3)
     label = name_of(variable, order, size, process)
-    ax.set_ylabel(quantity(label, ds[variable].attrs.get("units")))
-    handles = [handle(ds, described(ds), Look.number(0))]
-    legend_above(ax, [*handles, reference_handle(ds, name, "black")] if drawn else handles)
+    label_axis(ax, "y", label, ds[variable].attrs.get("units"))
+    label_time(ax, ds)
+    handles = [drawn_as(ds, described(ds), Look.number(0), log_time)]
+    if drawn:
+        handles.append(reference_handle(ds, found, name, "black", log_time))
+    legend_above(ax, handles)
     return root_of(ax)
 
 
@@ -229,8 +243,11 @@ def moments(
     for k, (p, curve) in enumerate(zip(chosen, curves, strict=True)):
         look = Look.number(k)
         drawn |= draw_reference(ax, ds, found, "moment", log_time, look.colour, order=float(p))
-        draw(ax, ds, ds["time"].values, curve.values, look, zorder=3)
-        handles.append(handle(ds, f"$M_{{{p:g}}}$", look))
-    ax.set_ylabel(quantity("moment $M_p$", ds["moment"].attrs.get("units")))
-    legend_above(ax, [*handles, reference_handle(ds, name, GREY)] if drawn else handles)
+        draw(ax, ds, curve.values, look, zorder=3)
+        handles.append(drawn_as(ds, f"$M_{{{p:g}}}$", look, log_time))
+    label_axis(ax, "y", "moment $M_p$", ds["moment"].attrs.get("units"))
+    label_time(ax, ds)
+    if drawn:
+        handles.append(reference_handle(ds, found, name, GREY, log_time))
+    legend_above(ax, handles)
     return root_of(ax)

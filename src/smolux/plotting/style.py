@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import AutoMinorLocator, LogLocator, NullFormatter
+from matplotlib.ticker import AutoMinorLocator, Formatter, LogLocator, NullFormatter
 
 from smolux.errors import InputError
 from smolux.files import replacing
@@ -31,6 +31,8 @@ PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#0
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 GREY = "#555555"
 
+#: values from ten to this power on are given in units of a power of ten
+_POWER = 4
 #: how a dimensionless quantity says so
 _NO_UNIT = (None, "", "1", 1)
 
@@ -49,6 +51,7 @@ _STYLE: dict[str, Any] = {
     "legend.handletextpad": 0.5,
     "axes.linewidth": 0.6,
     "axes.formatter.use_mathtext": True,
+    "axes.formatter.useoffset": False,  # it would stand where the legend does
     "lines.linewidth": 1.0,
     "lines.markersize": 3.2,
     "lines.markeredgewidth": 0.7,
@@ -119,6 +122,42 @@ def unit_text(units: object) -> str:
 def quantity(text: str, units: object) -> str:
     """Label an axis with a quantity and its unit; a dimensionless quantity has none."""
     return text if units in _NO_UNIT else f"{text} ({unit_text(units)})"
+
+
+class _Scaled(Formatter):
+    """Tick labels in units of a power of ten, which the label of the axis has."""
+
+    def __init__(self, power: int) -> None:
+        self.power = power
+        self.digits = 0
+
+    def set_locs(self, locs: Any) -> None:
+        """Find with how many decimals all ticks can be told apart."""
+        ticks = np.asarray(locs, float) / 10.0**self.power
+        fits = (d for d in range(12) if np.allclose(ticks, ticks.round(d), rtol=0, atol=1e-12))
+        self.digits = next(fits, 12)
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Write a tick."""
+        return f"{x / 10.0**self.power:.{self.digits}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def label_axis(ax: Axes, which: Literal["x", "y"], text: str, units: object = None) -> None:
+    """Label an axis in which all has been drawn; its power of ten, if it needs one, comes along.
+
+    Matplotlib would write the power above the axes, where the legend is.
+    """
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    largest = float(np.max(np.abs(axis.get_view_interval())))
+    power = 0
+    if axis.get_scale() == "linear" and np.isfinite(largest) and largest > 0:
+        power = int(np.floor(np.log10(largest)))
+    if abs(power) < _POWER:
+        axis.set_label_text(quantity(text, units))
+        return
+    axis.set_major_formatter(_Scaled(power))
+    unit = "" if units in _NO_UNIT else f" {unit_text(units)}"
+    axis.set_label_text(f"{text} ($10^{{{power}}}${unit})")
 
 
 def prefers_log(values: np.ndarray, ratio: float = 30.0) -> bool:
