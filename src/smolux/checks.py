@@ -77,6 +77,23 @@ def numbers(what: str, given: Any) -> NDArray[np.float64]:
     return values.astype(float)
 
 
+def orders_of_moments(given: Any) -> NDArray[np.float64]:
+    """Return orders of moments as an array of floats.
+
+    Raises
+    ------
+    InputError
+        If they are no different finite numbers.
+    """
+    found = np.atleast_1d(numbers("orders", given))
+    alone = found.ndim == 1 and 0 < len(np.unique(found)) == found.size
+    if not alone or not np.isfinite(found).all():
+        raise InputError(
+            f"orders = {given!r}: must be a list of different finite numbers, such as (0, 1, 2, 3)"
+        )
+    return found
+
+
 def _has_unit(value: Any) -> bool:
     """Whether a value is a quantity of pint, of astropy or of unyt; without importing them."""
     pint = hasattr(value, "units") and not callable(value.units)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .assembly import inflow, rates_for
-from .checks import is_number, numbers, whole
+from .checks import is_number, numbers, orders_of_moments, whole
 from .content import frozen
 from .core.state import Grid
 from .errors import InputError, did_you_mean
@@ -285,15 +285,10 @@ def _subvolumes(subvolumes: Any, remix: Any, particles: int, problems: list[str]
 
 def _orders(orders: Any, problems: list[str]) -> tuple[float, ...]:
     try:
-        powers = np.atleast_1d(np.asarray(orders, float))
-    except (TypeError, ValueError):
-        powers = np.empty(0)
-    flat = tuple(float(p) for p in powers.ravel())
-    if powers.ndim != 1 or not flat or not np.isfinite(powers).all() or len(set(flat)) < len(flat):
-        problems.append(
-            f"orders = {orders!r}: must be a list of different finite numbers, such as (0, 1, 2, 3)"
-        )
-    return flat
+        return tuple(orders_of_moments(orders).tolist())
+    except InputError as error:
+        problems += error.problems
+        return ()
 
 
 def check_times(times: ArrayLike, problems: list[str]) -> tuple[float, ...]:

@@ -44,7 +44,7 @@ WRONG = [
     ("bins_per_octave", 5000, "must be a whole number from 1 to 1024"),
     ("orders", [1, 1], "different finite numbers"),
     ("orders", [], "different finite numbers"),
-    ("orders", "all", "different finite numbers"),
+    ("orders", "all", "list of numbers"),
     ("times", [2.0, 1.0], "must ascend, but 1 follows 2"),
     ("times", [1.0, 1.0], "must ascend, but 1 follows 1"),
     ("times", [-1.0, 1.0], "zero or more"),

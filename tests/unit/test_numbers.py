@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pint
 import pytest
+import synthetic
 
 import smolux as sx
 from smolux import kernels, processes
@@ -103,3 +104,45 @@ def test_what_is_no_number(value):
 def test_parameters_that_are_no_plain_numbers_are_refused(make, value):
     with pytest.raises(sx.InputError):
         make(value)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        True,
+        "2",
+        ["2"],
+        (2, True),
+        (1, 1),
+        (),
+        [np.nan],
+        [[1, 2]],
+        SECONDS,
+        UREG.Quantity([1, 2], "s"),
+    ],
+    ids=str,
+)
+def test_orders_of_moments_that_are_none(given):
+    """In every place that takes them: one gate."""
+    model, ds = sx.Model(kernels.Constant()), synthetic.constant_dataset(particles=50)
+    for take in (
+        lambda: sx.simulate(model, [1.0], orders=given),
+        lambda: sx.solve(model, [1.0], orders=given),
+        lambda: sx.analysis.moments(ds, given),
+        lambda: sx.plotting.moments(ds, given),
+    ):
+        with pytest.raises(sx.InputError, match=r"^orders = "):
+            take()
+
+
+@pytest.mark.parametrize("given", [True, ["1"], SECONDS, UREG.Quantity([1.0], "s")], ids=str)
+def test_times_of_figures_and_analysis_that_are_none(given):
+    ds = synthetic.constant_dataset(particles=50)
+    values = np.ones(np.size(given))
+    for take in (
+        lambda: sx.plotting.size_distribution(ds, given),
+        lambda: sx.plotting.scaling(ds, given),
+        lambda: sx.analysis.extrema(given, values),
+    ):
+        with pytest.raises(sx.InputError, match=r"^times = "):
+            take()

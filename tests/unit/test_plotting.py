@@ -281,7 +281,7 @@ def test_save_says_what_is_wrong(many, tmp_path):
     ("draw", "message"),
     [
         (lambda ds: plotting.moments(ds, orders=(7,)), "order = 7"),
-        (lambda ds: plotting.moments(ds, orders=()), "name at least one"),
+        (lambda ds: plotting.moments(ds, orders=()), "must be a list of different finite"),
         (lambda ds: plotting.moments(ds, reference="exat"), "reference = 'exat'"),
         (lambda ds: plotting.moments(ds, width="triple"), "width = 'triple'"),
         (lambda ds: plotting.time_series(ds, "mometn"), "did you mean 'moment'"),

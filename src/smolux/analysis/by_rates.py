@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.checks import whole
+from smolux.checks import numbers, whole
 from smolux.errors import InputError, warn
 from smolux.kernels.base import Kernel
 from smolux.model import Model
@@ -104,8 +104,7 @@ def densities_by_rates(ds: xr.Dataset, sizes: ArrayLike, model: Model | None = N
 def _checked(ds: xr.Dataset, sizes: ArrayLike, model: Model | None) -> tuple[Any, ...]:
     """Return the sizes, the model and the weighting."""
     problems = []
-    given = np.atleast_1d(np.asarray(sizes))
-    wanted = [whole(k) for k in given.ravel().tolist()]
+    wanted = [whole(k) for k in np.atleast_1d(numbers("sizes", sizes)).ravel().tolist()]
     most = int(ds.sizes.get("size", 0))
     if not wanted or None in wanted or min(wanted) < 1 or max(wanted) > most:  # type: ignore[type-var, operator]
         problems.append(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import xarray as xr
+
+from smolux.checks import orders_of_moments
 
 
 def moments(ds: xr.Dataset, orders: Sequence[float] = (0, 1, 2, 3)) -> xr.Dataset:
@@ -28,7 +29,8 @@ def moments(ds: xr.Dataset, orders: Sequence[float] = (0, 1, 2, 3)) -> xr.Datase
         The variables moment, lower and upper with the dimensions of n, ``order`` in place of
         ``size``. The estimate puts all clusters of a bin at its geometric centre.
     """
-    p = xr.DataArray(np.asarray(orders, float), dims="order", coords={"order": list(orders)})
+    powers = orders_of_moments(orders)
+    p = xr.DataArray(powers, dims="order", coords={"order": powers})
     exact = (ds["n"] * ds["size"].astype(float) ** p).sum("size", skipna=False)
     parts = [exact, exact, exact]
     if ds.sizes.get("bin", 0):

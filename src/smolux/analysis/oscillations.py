@@ -11,6 +11,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy import signal
 
+from smolux.checks import numbers
 from smolux.errors import InputError
 
 from .select import series
@@ -83,9 +84,10 @@ def extrema(
     kinds : ndarray of int, shape (E,)
         +1 for a maximum, -1 for a minimum; they alternate.
     """
-    seen = np.isfinite(values)
-    stop = len(values) if seen.all() else int(np.argmin(seen))
-    t, y = np.asarray(times, float)[:stop], np.asarray(values, float)[:stop]
+    t, y = numbers("times", times), numbers("values", values)
+    seen = np.isfinite(y)
+    stop = len(y) if seen.all() else int(np.argmin(seen))
+    t, y = t[:stop], y[:stop]
     if stop < 5:
         return np.array([]), np.array([]), np.array([], int)
     noise = _noise(t, y)

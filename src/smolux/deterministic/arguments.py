@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import is_number, numbers
+from ..checks import is_number, numbers, orders_of_moments
 from ..errors import InputError, did_you_mean
 from ..model import Model
 from .operator import METHODS
@@ -94,11 +94,11 @@ def check(
         "bins_per_octave": _whole("bins_per_octave", bins_per_octave, 1, problems),
     }
     output = _times(times, problems)
-    powers = np.atleast_1d(np.asarray(orders, float))
-    if powers.ndim != 1 or not powers.size or not np.isfinite(powers).all():
-        problems.append(
-            f"orders = {orders!r}: must be a list of finite numbers, such as (0, 1, 2, 3)"
-        )
+    powers = np.empty(0)
+    try:
+        powers = orders_of_moments(orders)
+    except InputError as error:
+        problems += error.problems
     if gel == "reacts" and isinstance(model, Model):
         others = [p.name for p in model.processes if p.name != "aggregation"]
         if others:

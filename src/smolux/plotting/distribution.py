@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from smolux.analysis.reference import is_deterministic
 from smolux.analysis.statistics import over_replicas
+from smolux.checks import numbers
 from smolux.errors import InputError
 
 from .curves import Look, Reference, draw_line, draw_values, handle, resolve
@@ -114,7 +115,7 @@ def chosen_times(ds: xr.Dataset, times: Sequence[float] | None) -> list[int]:
         spread = np.linspace(0, shown.size - 1, 4).round().astype(int)
         return np.unique(shown[spread]).tolist()
     problems, found = [], []
-    for t in np.atleast_1d(np.asarray(times, float)):
+    for t in np.atleast_1d(numbers("times", times)):
         near = int(np.abs(present - t).argmin())
         if not np.isclose(present[near], t, rtol=1e-9, atol=0):
             problems.append(f"times: no output at t = {t:g}; the nearest is {present[near]:g}")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from smolux.analysis.reference import is_deterministic
 from smolux.analysis.select import series
 from smolux.analysis.statistics import over_replicas
+from smolux.checks import orders_of_moments
 from smolux.errors import InputError
 
 from .curves import (
@@ -215,7 +216,7 @@ def moments(
     ds : xarray.Dataset
         A result of simulate (dots with 95 % intervals) or of solve (lines).
     orders : sequence of float, optional
-        Which; all of the result but the first, the conserved mass, if left out.
+        Which; if left out, all of the result but the first, the mass, where it is conserved.
     reference : "exact", Dataset or None
         Lines to compare with.
     ax : Axes, optional
@@ -232,7 +233,10 @@ def moments(
     InputError
         If the result has no moment of such an order.
     """
-    chosen = [p for p in ds["order"].values if p != 1] if orders is None else list(orders)
+    if orders is None:
+        chosen = [p for p in ds["order"].values if p != 1 or "mass_in" in ds]
+    else:
+        chosen = orders_of_moments(orders).tolist()
     if not chosen:
         raise InputError("orders: name at least one, such as orders=(0, 2)")
     curves = [series(ds, "moment", order=float(p)) for p in chosen]

@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from .. import results
+from ..checks import numbers
 from ..errors import InputError
 from .box import Box
 from .genealogy import merger_tree
@@ -304,7 +305,8 @@ def replay(result: xr.DataTree, time: float) -> xr.Dataset:
     """
     _check(result)
     reached = float(result.attrs["time_reached"])
-    if not 0 <= time <= reached:
+    instant = numbers("time", time)
+    if instant.ndim or not 0 <= instant <= reached:
         raise InputError(f"time = {time!r}: must lie between 0 and {reached:g}, which was reached")
     _check_exact(result)
     values = replayed(system_of(result), log_of(result), float(time))
