@@ -10,6 +10,7 @@ from flights import system
 
 import smolux as sx
 import smolux.spatial as sp
+from shared import stopped
 from smolux import results
 
 
@@ -19,6 +20,7 @@ def merges(result):
     return np.sort(np.stack([events["first"], events["second"]], 1), 1), events["time"].values
 
 
+@stopped
 @pytest.mark.parametrize("number", range(8))
 def test_a_run_with_stops_makes_the_merges_of_one_without(number, tmp_path):
     s = system(number)
@@ -50,6 +52,7 @@ def test_what_is_reached_already():
         sp.resume(end, until=0.1)
 
 
+@stopped
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs timers")
 def test_ctrl_c_leaves_what_was_reached():
     """It comes while the compiled loop runs; the events of that loop must not be lost."""

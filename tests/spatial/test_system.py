@@ -152,7 +152,10 @@ def test_what_is_no_system_or_result():
 
 def test_limits_and_progress():
     s, told = sp.lattice(100, 0.2, seed=3), []
-    result = sp.simulate(s, max_events=20, progress=told.append)
+    with pytest.warns(sx.SmoluxWarning, match="limit of 20 events") as warned:
+        result = sp.simulate(s, max_events=20, progress=told.append)
+    assert [str(w.message) for w in warned] == sx.results.warnings(result)
+    assert [w.filename for w in warned] == [__file__]
     assert result["events"].sizes["event"] + result["walls"].sizes["reflection"] == 20
     assert "limit of 20 events" in result.attrs["stopped"]
     assert not result.attrs["complete"]
