@@ -10,11 +10,11 @@ import laws
 import pytest
 
 import smolux as sx
+from shared import extinction
 from smolux.core.state import TRIALS
 from smolux.methods import METHODS
 from smolux.plan import make_plan
 from smolux.replicas import Group
-from shared import extinction
 
 pytestmark = extinction
 
@@ -137,4 +137,4 @@ def test_a_majorant_of_a_law_with_zeros(method: str) -> None:
     place, p = chains.law((1, 1, 1, 2, 2, 2), moves, (0.5,), 6)
     mean = sum(p[0][k] * len(state) for state, k in place.items())
     laws.agree(ds["particles"].values[:, 0], mean, method)
-    assert not any("bound" in text for text in json.loads(ds.attrs["warnings"]))
+    assert not any("bound" in text for text in sx.results.warnings(ds))
