@@ -20,7 +20,9 @@ VARYING = "0.4 * (1 + sin(5 * t))"
 #: methods whose loops compile fast; with the others, what does not depend on the method is slow
 QUICK = ("size-class", "acceptance-rejection")
 #: for tests of runs that are stopped on purpose
-stopped = pytest.mark.filterwarnings("default:the limit of:smolux.errors.SmoluxWarning")
+stopped = pytest.mark.filterwarnings(
+    r"default:(the (time )?limit of|memory|\d+ replicas did not reach):smolux.errors.SmoluxWarning"
+)
 #: for tests of small systems in a fixed volume, which end as one cluster: that is no mistake there
 extinction = pytest.mark.filterwarnings(
     "default:.*ended as one cluster:smolux.errors.SmoluxWarning"

@@ -12,12 +12,15 @@ import numpy as np
 import pytest
 import runs
 
+import shared
 import smolux as sx
 from shared import QUICK, VARYING
 from smolux import checkpoint as checkpoints
 from smolux import replicas, resources, room
 from smolux.core.state import BUDGET, GROW
 from smolux.errors import InputError, Interrupted
+
+pytestmark = shared.stopped
 
 TIMES = [0.0, 0.3, 1.0, 2.0]
 SETTINGS: dict[str, Any] = {"particles": 2000, "replicas": 3, "seed": 5, "sizes": 40}

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import runs
 
+import shared
 import smolux as sx
 from shared import VARYING
 from smolux import plan, resources, room, subvolumes
@@ -18,6 +19,8 @@ from smolux.errors import InputError, SmoluxWarning
 from smolux.exact import finite
 from smolux.replicas import Group
 from smolux.subvolumes import Divided
+
+pytestmark = shared.stopped
 
 SETTINGS: dict[str, Any] = {"particles": 4000, "replicas": 2, "seed": 3, "sizes": 40}
 TIMES = [0.0, 0.5, 2.0]

@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 import runs
 
+import shared
 import smolux as sx
 from smolux import driving, replicas, stochastic
 from smolux.errors import InputError, SmoluxWarning
 from smolux.goal import Goal, judge
+
+pytestmark = shared.stopped
 
 TIMES = [0.0, 0.5, 2.0]
 #: reached with 16 to 64 replicas of 150 particles
