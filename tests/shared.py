@@ -21,7 +21,8 @@ VARYING = "0.4 * (1 + sin(5 * t))"
 QUICK = ("size-class", "acceptance-rejection")
 #: for tests of runs that are stopped on purpose
 stopped = pytest.mark.filterwarnings(
-    r"default:(the (time )?limit of|memory|\d+ replicas did not reach):smolux.errors.SmoluxWarning"
+    r"default:(the (time )?limit of|memory|no checkpoint|\d+ replicas did not reach)"
+    ":smolux.errors.SmoluxWarning"
 )
 #: for tests of small systems in a fixed volume, which end as one cluster: that is no mistake there
 extinction = pytest.mark.filterwarnings(

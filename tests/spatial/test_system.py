@@ -189,7 +189,8 @@ def test_the_clock_and_the_memory_stop_a_run(why, monkeypatch):
     else:
         given["time_limit"] = 1e-9
     monkeypatch.setattr(running, "_BUDGET", 20)
-    cut = sp.simulate(s, **given)
+    with pytest.warns(sx.SmoluxWarning, match=why):
+        cut = sp.simulate(s, **given)
     monkeypatch.undo()
     assert cut.attrs["stopped"].startswith(why)
     assert not cut.attrs["complete"]
