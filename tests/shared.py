@@ -24,6 +24,8 @@ stopped = pytest.mark.filterwarnings(
     r"default:(the (time )?limit of|memory|no checkpoint|\d+ replicas did not reach)"
     ":smolux.errors.SmoluxWarning"
 )
+#: for tests of methods where they are slow on purpose
+laborious = pytest.mark.filterwarnings("default:.*fewer than 1 in 1000:smolux.errors.SmoluxWarning")
 #: for tests of small systems in a fixed volume, which end as one cluster: that is no mistake there
 extinction = pytest.mark.filterwarnings(
     "default:.*ended as one cluster:smolux.errors.SmoluxWarning"

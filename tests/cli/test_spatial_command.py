@@ -7,7 +7,7 @@ from command import call
 
 from smolux import results
 from smolux.case import load, spatial
-from smolux.errors import InputError
+from smolux.errors import InputError, SmoluxWarning
 from smolux.spatial import running, simulate
 
 CASE = """\
@@ -103,7 +103,8 @@ def test_what_was_interrupted_goes_on(folder):
     whole = call("run", "few.toml").stdout
     file = folder / "few" / "results.nc"
     case = results.load(file).attrs["case"]
-    part = simulate(spatial.load("few.toml").run.system(), max_events=20)
+    with pytest.warns(SmoluxWarning, match="the limit of 20 events"):
+        part = simulate(spatial.load("few.toml").run.system(), max_events=20)
     part.attrs |= {"stopped": "interrupted", "case": case}
     results.save(part, file)
     again = call("run", "few")

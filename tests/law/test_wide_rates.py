@@ -10,13 +10,13 @@ import laws
 import pytest
 
 import smolux as sx
-from shared import extinction
+from shared import extinction, laborious
 from smolux.core.state import TRIALS
 from smolux.methods import METHODS
 from smolux.plan import make_plan
 from smolux.replicas import Group
 
-pytestmark = extinction
+pytestmark = [extinction, laborious]
 
 END = 1e12
 
@@ -33,7 +33,7 @@ def _kernel(
     return sx.kernels.formula(FORMULA, c0=c0, c1=c1, c2=c2, c3=c3, power=power)
 
 
-@pytest.mark.parametrize("method", ["inverse", "size-class", "acceptance-rejection"])
+@pytest.mark.parametrize("method", ["inverse", "size-class"])
 def test_rates_over_24_decades(method: str) -> None:
     kernel = _kernel(c0=1e-12, c1=1e12)
     start = sx.initial.from_sizes({1: 4 / 7, 10: 3 / 7})

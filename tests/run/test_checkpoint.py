@@ -152,7 +152,8 @@ def test_no_memory_to_grow_keeps_what_was_computed(
     assert caught.value.checkpoint == path
     ds: Any = caught.value.dataset
     assert not ds.attrs["complete"]
-    assert np.isfinite(ds["number_density"].values[:, 1]).any()
+    # a store that is really full may come first
+    assert np.isfinite(ds["number_density"].values[:, 0]).any()
     runs.assert_same(expected, sx.resume(path))
 
 

@@ -9,6 +9,7 @@ from flights import METHODS, merges, run
 
 import smolux.spatial as sp
 from smolux import results
+from smolux.errors import SmoluxWarning
 
 
 @pytest.fixture(scope="module")
@@ -215,6 +216,7 @@ def test_a_filled_axis_is_logged_and_replayed():
     for trace in traces:
         np.testing.assert_array_equal(trace.log.second, [1, -3])
         np.testing.assert_array_equal(trace.velocity, 0)
-    result = sp.simulate(s, until=3.0)
+    with pytest.warns(SmoluxWarning, match="nothing moves relative to anything else"):
+        result = sp.simulate(s, until=3.0)
     assert result["walls"]["at_rest"].values.tolist() == [1]
     np.testing.assert_allclose(sp.replay(result, 1.0)["position"], s.position, atol=1e-15)

@@ -14,7 +14,7 @@ from .. import analysis
 from ..case import Case
 from ..deterministic import SolverError
 from ..deterministic.solver import solve
-from ..errors import InputError, Interrupted, did_you_mean
+from ..errors import InputError, Interrupted, did_you_mean, quiet
 from ..methods import METHODS
 from . import console
 from .progress import Display
@@ -99,7 +99,8 @@ def _simulated(case: Case, name: str, number: int, progress: Display) -> Compute
     assert run is not None
     assert run.seed is not None
     settings = replace(run, method=name, seed=run.seed + number).arguments()
-    ds = smolux.simulate(case.model, **settings, time_limit=run.time_limit, progress=progress)
+    with quiet():  # warnings are shown with the results
+        ds = smolux.simulate(case.model, **settings, time_limit=run.time_limit, progress=progress)
     if not ds.attrs["complete"]:
         raise Interrupted(f"{name}: {ds.attrs['stopped']}: raise run.time_limit, or leave it out")
     compiling = float(ds.attrs["compile_seconds"])
@@ -116,10 +117,11 @@ def _solved(case: Case, progress: Display) -> Computed:
     if case.solve is not None:
         settings = {k: v for k, v in asdict(case.solve).items() if v is not None}
     begun = time.perf_counter()
-    ds = solve(
-        case.model, **settings, orders=run.orders, sizes=run.sizes,
-        bins_per_octave=run.bins_per_octave, progress=progress,
-    )  # fmt: skip
+    with quiet():
+        ds = solve(
+            case.model, **settings, orders=run.orders, sizes=run.sizes,
+            bins_per_octave=run.bins_per_octave, progress=progress,
+        )  # fmt: skip
     wall = time.perf_counter() - begun
     compiling = float(ds.attrs.get("compile_seconds", 0.0))
     return Computed(SOLVER, ds, wall - compiling, compiling, float("nan"))

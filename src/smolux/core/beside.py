@@ -92,14 +92,6 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
                 wait = draw(s, w, p, total)
             if math.isnan(wait):
                 return BAD_RATE
-        if lones > 0:
-            alone = lone(s, w, windows, q.lone)
-            if math.isnan(alone):
-                return BAD_RATE
-            if alone < wait:
-                wait = alone
-                s.count[KIND] = ALONE
-                seize(s, w, s.count[LONE])
         if sources > 0:
             rate = source_rate(s, windows)
             if rate > 0.0:
@@ -107,6 +99,14 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
                 if come < wait:
                     wait = come
                     s.count[KIND] = SOURCE
+        if lones > 0:
+            alone = lone(s, w, windows, q.lone, wait)
+            if math.isnan(alone):
+                return BAD_RATE
+            if alone < wait:
+                wait = alone
+                s.count[KIND] = ALONE
+                seize(s, w, s.count[LONE])
         schedule(s, windows, wait)
         return 0
 

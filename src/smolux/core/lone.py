@@ -256,7 +256,12 @@ def make_ledger(rates: Rates, visit: Callable[[Any], Any], count: int) -> Ledger
 
 
 def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) -> Any:
-    """Bind the drawing of the next event of a single particle: the waiting time, NaN if no rate."""
+    """Bind the drawing of the next event of a single particle.
+
+    ``draw(s, w, windows, q, limit)`` returns the waiting time; infinite if it would not be below
+    the `limit`, at which something else takes place, and NaN if there is no rate. No particle is
+    looked for before it is known that nothing else comes first.
+    """
     total, part = rates.total, rates.part
 
     @piece
@@ -291,9 +296,22 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
     def accepted(s, value, most):
         return value >= most or rng.uniform(s.rng) * most < value
 
+    @piece
+    def candidate(s, w, r, c, q):
+        """Draw a particle of a slot: whether process `r` takes place, 1 or 0; -1 for no rate."""
+        before = s.count[TRIALS]
+        s.count[TRIALS] += 1
+        high = slot_top(c, np.int64(LONE_BITS))
+        one, size = pick(s, w, slot_top(c - 1, np.int64(LONE_BITS)) + 1, high, s.held[c])
+        s.count[LONE], s.count[LONE_SIZE], s.count[LONE_PROCESS] = one, size, r
+        s.count[LONE_PART] = 0
+        if accepted(s, total(r, size, s, q), s.most[r, c]):
+            s.count[LONE_PART] = part(r, size, s, q)
+        s.attempts[pairs + r] += s.count[TRIALS] - before
+        return min(s.count[LONE_PART], np.int64(1))
+
     @cold_piece
-    def draw_lone(s, w, windows, q):
-        s.count[LONE] = -1
+    def draw_lone(s, w, windows, q, limit):
         if s.count[PARTICLES] == 0:
             return math.inf
         octaves = (slot_of(s.count[LARGEST], np.int64(LONE_BITS)) >> LONE_BITS) + 1
@@ -309,26 +327,23 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
             return math.inf
         wait = 0.0
         for _ in range(PATIENCE):
-            wait += rng.exponential(s.rng)
+            wait += rng.exponential(s.rng) / rate
+            if wait >= limit:
+                return math.inf
             r, c = find_slot(s, windows, octaves, rng.uniform(s.rng) * rate)
-            before = s.count[TRIALS]
-            s.count[TRIALS] += 1
-            high = slot_top(c, np.int64(LONE_BITS))
-            one, size = pick(s, w, slot_top(c - 1, np.int64(LONE_BITS)) + 1, high, s.held[c])
-            piece_of_it = np.int64(0)
-            if accepted(s, total(r, size, s, q), s.most[r, c]):
-                piece_of_it = part(r, size, s, q)
-            s.attempts[pairs + r] += s.count[TRIALS] - before
-            if piece_of_it < 0:
+            taken = candidate(s, w, r, c, q)
+            if taken < 0:
                 s.count[CULPRIT] = r + 1
                 return math.nan
-            if piece_of_it > 0:
-                s.count[LONE], s.count[LONE_SIZE] = one, size
-                s.count[LONE_PROCESS], s.count[LONE_PART] = r, piece_of_it
-                break
+            if taken > 0:
+                return wait
             s.count[VAIN] += 1
+            if s.count[VAIN] > _ENOUGH * s.count[PARTICLES] + PATIENCE:
+                break
+        # what had the largest rates may be gone
         if s.count[VAIN] > _ENOUGH * s.count[PARTICLES] + PATIENCE:
-            s.held[0] = 0  # what had the largest rates may be gone
-        return wait / rate
+            s.held[0] = 0
+        s.count[LONE] = -1
+        return wait
 
     return draw_lone
