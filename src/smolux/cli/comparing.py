@@ -16,6 +16,7 @@ from ..deterministic import SolverError
 from ..deterministic.solver import solve
 from ..errors import InputError, Interrupted, did_you_mean, quiet
 from ..methods import METHODS
+from ..results import warnings
 from . import console
 from .progress import Display
 
@@ -91,6 +92,9 @@ def compute(
         else:
             with display() as progress:
                 found.append(_simulated(case, name, number, progress))
+    for computed in found:
+        for text in warnings(computed.ds):
+            console.say(f"{computed.name}: warning: {text}")
     return found
 
 
@@ -99,7 +103,7 @@ def _simulated(case: Case, name: str, number: int, progress: Display) -> Compute
     assert run is not None
     assert run.seed is not None
     settings = replace(run, method=name, seed=run.seed + number).arguments()
-    with quiet():  # warnings are shown with the results
+    with quiet():  # they are said in words of the command line
         ds = smolux.simulate(case.model, **settings, time_limit=run.time_limit, progress=progress)
     if not ds.attrs["complete"]:
         raise Interrupted(f"{name}: {ds.attrs['stopped']}: raise run.time_limit, or leave it out")
