@@ -263,6 +263,12 @@ def test_compare_puts_methods_side_by_side(folder):
     assert "did you mean 'inverse'" in call("compare", "small.toml", "-m", "invers", code=2).stderr
 
 
+def test_compare_says_the_warnings_of_each_method(folder):
+    sets = ("-s", "run.particles=10", "-s", 'run.population="fixed-volume"', "-s", "run.times=[1e6]")
+    found = call("compare", "small.toml", "-m", "acceptance-rejection", *sets).stderr
+    assert "acceptance-rejection: warning: 3 of 3 replicas ended as one cluster" in found
+
+
 def test_compare_ends_with_1_if_a_method_differs(folder, monkeypatch):
     from smolux.cli import comparing
 
