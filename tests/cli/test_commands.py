@@ -264,15 +264,9 @@ def test_compare_puts_methods_side_by_side(folder):
 
 
 def test_compare_says_the_warnings_of_each_method(folder):
-    sets = (
-        "-s",
-        "run.particles=10",
-        "-s",
-        'run.population="fixed-volume"',
-        "-s",
-        "run.times=[1e6]",
-    )
-    found = call("compare", "small.toml", "-m", "acceptance-rejection", *sets).stderr
+    sets = "run.particles=10", 'run.population="fixed-volume"', "run.times=[1e6]"
+    given = [part for one in sets for part in ("-s", one)]
+    found = call("compare", "small.toml", "-m", "acceptance-rejection", *given).stderr
     assert "acceptance-rejection: warning: 3 of 3 replicas ended as one cluster" in found
 
 

@@ -19,9 +19,7 @@ FORMULA = "c0*(i*j)**p*max(0, 1 - abs(i + j - k0)) + c1*max(0, 1 - max(0, abs(i 
 #: a test fails once in 10^4 if all is right
 LEAST = 1e-4
 METHODS = [
-    pytest.param(
-        m.name, marks=() if m.name in ("size-class", "acceptance-rejection") else pytest.mark.slow
-    )
+    pytest.param(m.name, marks=() if m.name == "size-class" else pytest.mark.slow)
     for m in sx.methods.METHODS
 ]
 
@@ -90,6 +88,7 @@ def _splits_of_one_size(i: float, j: float) -> float:
     return 2.0 / 1029 if i + j == 1030 else 0.0
 
 
+@pytest.mark.slow
 def test_functions_of_one_size_are_not_overlooked() -> None:
     """Python functions known by their values, not zero for one size only."""
     processes = [
@@ -117,6 +116,7 @@ def test_a_rate_that_left_is_forgotten(method: str) -> None:
     assert ds["attempts"].sel(process="removal").max() < 50_000
 
 
+@pytest.mark.slow
 def test_a_giant_does_not_slow_down_the_rest() -> None:
     """A rate that grows by e every hundred monomers; against the rate equations."""
     breakage = P.Fragmentation("0.2*exp(0.01*min(i + j, 2000))/(i + j - 1)")
@@ -129,6 +129,7 @@ def test_a_giant_does_not_slow_down_the_rest() -> None:
     assert ds["attempts"].sum() < 10 * ds["events"].sum()
 
 
+@pytest.mark.slow
 def test_few_accepted_candidates_are_warned_of() -> None:
     """Acceptance-rejection finds the one large particle by trying all."""
     start = sx.initial.from_sizes({2: 1 - 1e-4, 1030: 1e-4})

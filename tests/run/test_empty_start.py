@@ -42,7 +42,7 @@ def test_what_begins_empty_is_not_doubled(parts: int) -> None:
 
 def test_an_estimate_of_a_system_that_begins_empty() -> None:
     density, volume = np.array([0.0, 1.0, 3.0]), np.full(3, 100.0)
-    pilot = Pilot(100, np.arange(3.0), density, np.zeros(3), volume, np.ones(3), 1e-8, 2.0)
+    pilot = Pilot(100, np.arange(3.0), density, np.zeros(3), volume, np.ones(3), 1e-8, 2.0, False)
     run: Any = type("Run", (), {"particles": 1000, "population": "fixed-volume"})()
     assert pilot.fewest(run) == np.inf
     assert pilot.growth(run) == 3.0

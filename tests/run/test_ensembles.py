@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import smolux as sx
-from shared import FORMULA
+from shared import FORMULA, extinction
 from smolux.ensembles import Moments
 from smolux.ensembles.batches import Sampler, make_sampler
 from smolux.errors import InputError
@@ -85,6 +85,7 @@ def test_the_replicas_are_those_of_simulate(q: float):
     assert float(found["collisions"]) * 203 == pytest.approx(ds.attrs["events"], rel=1e-12)
 
 
+@extinction
 def test_a_run_whose_stores_grow_leaves_no_wrong_tables():
     """With the loop of the law tests; the first run learns tables for twice as many slots."""
     kernel = sx.kernels.formula(FORMULA, c0=0.0, c1=1.0, c2=0.0, c3=0.0)
