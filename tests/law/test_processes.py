@@ -19,7 +19,7 @@ import pytest
 from scipy import integrate
 
 import smolux as sx
-from shared import FORMULA
+from shared import FORMULA, laborious
 from smolux import case as cases
 from smolux.deterministic import steady_state
 from smolux.errors import InputError
@@ -347,6 +347,7 @@ ZEROS = {
 }
 
 
+@laborious
 @pytest.mark.parametrize(
     "method",
     [
