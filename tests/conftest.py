@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--other-processor",
         action="store_true",
         help="let laws evaluated on arrays differ in the last bit, see tests/processor.py",
+    )
+    parser.addoption(
+        "--part",
+        default="0/1",
+        metavar="K/N",
+        help="take the K-th of N parts, from 0 on; what shares compiled loops is in one part",
     )
 
 
@@ -104,8 +111,18 @@ def group(nodeid: str) -> str:
     return next((name for start, name in _TOGETHER.items() if file.startswith(start)), file)
 
 
+def _in_part(nodeid: str, part: int, parts: int) -> bool:
+    """Whether a test is in this part: by its file, and by its group there."""
+    return zlib.crc32(f"{nodeid.partition('::')[0]} {group(nodeid)}".encode()) % parts == part
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Put what takes long first."""
+    """Leave out what is in other parts, and put what takes long first."""
+    part, parts = map(int, config.option.part.split("/"))
+    left_out = [item for item in items if not _in_part(item.nodeid, part, parts)]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if _in_part(item.nodeid, part, parts)]
     if hasattr(config, "workerinput"):
         place = {name: k for k, name in enumerate(_LONG)}
         items.sort(key=lambda item: place.get(group(item.nodeid), len(place)))
