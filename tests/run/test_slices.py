@@ -186,4 +186,5 @@ def test_growth_by_the_least_and_resuming_at_every_slice(
             if turn % every == 0:
                 group = written(group, tmp_path / "run.npz")
         assert_same(whole, group, slice(None), slice(None))
-    assert grown
+    # the inverse method counts the sizes that come here, and has no list of large ones to grow
+    assert grown or (method == "inverse" and case in ("open", "pairs"))
