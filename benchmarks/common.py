@@ -97,5 +97,8 @@ python benchmarks/osinsky_2022.py
 python benchmarks/kolodko_2003.py
 python benchmarks/estimators.py
 python benchmarks/auto.py
+python benchmarks/parallel.py
+python benchmarks/breakage.py
+python benchmarks/bounds.py
 ```
 """
