@@ -5,8 +5,8 @@ every later run. What is remembered is known by its content: the law with all th
 parameters, the weighting, the boxes, the code that finds bounds, and what decides the last bit of
 a number on this machine. So bounds are the same bit for bit wherever they come from.
 
-A file holds one answer behind its checksum. It is written under another name and moved into place;
-a damaged one is found anew, and a folder that cannot be written to costs time, not the run.
+A file holds one answer behind its checksum, see `smolux.files.keep`; a damaged one is found anew,
+and a folder that cannot be written to costs time, not the run.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import contextlib
 import hashlib
 import os
 import platform
-import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -29,6 +28,7 @@ from numpy.typing import NDArray
 
 from .content import digest
 from .core.compile import cache_directory
+from .files import keep, kept
 from .kernels.base import Kernel
 from .weighting.base import Weighting
 
@@ -37,17 +37,13 @@ Given = ParamSpec("Given")
 Found = TypeVar("Found")
 
 #: raised whenever what a file holds changes
-_FORMAT = 1
+_FORMAT = 2
 #: the most answers that are remembered of a law in a process
 _MOST = 64
 #: files and bytes beyond which the oldest files are removed, until half are left
 _MOST_FILES, _MOST_BYTES = 4096, 1 << 25
 #: files that are written between two looks at how many there are
 _BETWEEN = 64
-#: seconds after which a file that was never moved into place is known to be left behind
-_STALE = 3600.0
-_CHECKSUM = hashlib.sha256
-_UNFINISHED = ".new-"
 
 
 class Bounds:
@@ -148,19 +144,15 @@ def _folder() -> Path | None:
 
 
 def _read(key: str, count: int) -> tuple[Float, Float] | None:
-    folder = _folder()
+    folder, body = _folder(), None
     if folder is None:
         return None
-    path = folder / key
-    try:
-        held = path.read_bytes()
-    except OSError:
-        return None
-    checksum, body = held[:32], held[32:]
-    if len(body) != 16 * count or _CHECKSUM(body).digest() != checksum:
-        return None
     with contextlib.suppress(OSError):
-        os.utime(path)  # the oldest are those that were not wanted for longest
+        body = kept(folder / key)
+        if body is not None:
+            os.utime(folder / key)  # the oldest are those that were not wanted for longest
+    if body is None or len(body) != 16 * count:
+        return None
     lower, upper = np.frombuffer(body, "<f8").astype(float).reshape(2, count)
     return lower, upper
 
@@ -175,30 +167,20 @@ def _write(key: str, lower: Float, upper: Float) -> None:
         return
     body = np.stack([lower.ravel(), upper.ravel()]).astype("<f8").tobytes()
     with contextlib.suppress(OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-        fd, temporary = tempfile.mkstemp(prefix=_UNFINISHED, dir=folder)
-        try:
-            with os.fdopen(fd, "wb") as file:
-                file.write(_CHECKSUM(body).digest() + body)
-            os.replace(temporary, folder / key)
-        except BaseException:
-            os.unlink(temporary)
-            raise
+        keep(folder / key, body)
         if _written % _BETWEEN == 0:
             _tidy(folder)
         _written += 1
 
 
 def _tidy(folder: Path) -> None:
-    """Remove the oldest files if they are too many, and what a killed process has left."""
-    held, now = [], time.time()
+    """Remove the oldest files if they are too many."""
+    held = []
     for entry in os.scandir(folder):
         with contextlib.suppress(OSError):
             about = entry.stat()
-            if not entry.name.startswith(_UNFINISHED):
+            if not entry.name.startswith("."):  # else it is being written
                 held.append((about.st_mtime, about.st_size, entry.path))
-            elif now - about.st_mtime > _STALE:
-                os.unlink(entry.path)
     files, size = len(held), sum(size for _, size, _ in held)
     if files <= _MOST_FILES and size <= _MOST_BYTES:
         return

@@ -16,7 +16,7 @@ import pytest
 import runs
 
 import smolux as sx
-from smolux import remembered, tables
+from smolux import files, remembered, tables
 from smolux.assembly import rates_for
 from smolux.kernels import Additive
 from smolux.laws import Law
@@ -236,15 +236,15 @@ def test_the_folder_does_not_grow_without_end(
     monkeypatch.setattr(remembered, "_MOST_FILES", 6)
     monkeypatch.setattr(remembered, "_BETWEEN", 1)
     folder.mkdir()
-    for name, age in (("old", 2.0 * remembered._STALE), ("new", 0.0)):
-        left = folder / f"{remembered._UNFINISHED}{name}"
+    for name, age in ((".old.01234567", 2.0 * files._STALE_SECONDS), (".new.01234567", 0.0)):
+        left = folder / name
         left.write_text("")
         os.utime(left, (time.time() - age,) * 2)
     for k in range(20):
         found(kernel, [side + k for side in BOXES])
         assert len(list(folder.iterdir())) <= 7
-    unfinished = [f.name for f in folder.iterdir() if f.name.startswith(remembered._UNFINISHED)]
-    assert unfinished == [f"{remembered._UNFINISHED}new"]
+    unfinished = [f.name for f in folder.iterdir() if f.name.startswith(".")]
+    assert unfinished == [".new.01234567"]
 
 
 def test_threads_wait_for_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
