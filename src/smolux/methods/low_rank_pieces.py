@@ -120,6 +120,15 @@ def _pair_by_term(s, w, stage, total):
     w.chosen[2], w.chosen[3] = _choose(w, w.term[stage, k, 1], rng.uniform(s.rng))
 
 
+@piece
+def _choose_pair(s, w, stage, total):
+    """Choose a pair by the majorant, which is `total` over all of them."""
+    if w.rank[stage, 2] == 0:
+        _pair_by_term(s, w, stage, total)
+    else:
+        _pair_mixed(s, w, stage, total)
+
+
 @cold_piece
 def _with_apart(w, stage):
     """Sum of the majorant over the particle held apart and any other; coefficients in ``w.mix``."""
@@ -196,6 +205,16 @@ def make_draw(rate: Any) -> Any:
             repair(s, i, j, value * units / majorant * raised, raised)
         return 1 if x * majorant < value * units else 0
 
+    @piece
+    def collides(s, w, p, stage, raised):
+        """Note the chosen pair if it collides, and whether: 1 or 0; -1 if its rate is none."""
+        if w.chosen[0] == w.chosen[2] and w.chosen[1] == w.chosen[3]:
+            return 0  # a particle does not meet itself
+        verdict = accepted(s, w, p, stage, raised)
+        if verdict > 0:
+            s.count[FIRST] = w.chosen[0]
+        return verdict
+
     @cold_piece
     def draw_with_apart(s, w, p, factor, others):
         """Do the same with a particle that is held apart; `others` is the sum without it."""
@@ -211,17 +230,12 @@ def make_draw(rate: Any) -> Any:
             x = rng.uniform(s.rng) * total
             if x < apart:
                 _pair_with_apart(w, stage, x)
-            elif w.rank[stage, 2] == 0:
-                _pair_by_term(s, w, stage, others)
             else:
-                _pair_mixed(s, w, stage, others)
-            if w.chosen[0] == w.chosen[2] and w.chosen[1] == w.chosen[3]:
-                continue
-            verdict = accepted(s, w, p, stage, raised)
+                _choose_pair(s, w, stage, others)
+            verdict = collides(s, w, p, stage, raised)
             if verdict < 0:
                 return math.nan
             if verdict > 0:
-                s.count[FIRST] = w.chosen[0]
                 break
         if s.count[FIRST] < 0:
             w.meta[STAGE] = -1
@@ -246,17 +260,11 @@ def make_draw(rate: Any) -> Any:
         for _ in range(PATIENCE):
             s.count[TRIALS] += 1
             wait += rng.exponential(s.rng)
-            if w.rank[stage, 2] == 0:
-                _pair_by_term(s, w, stage, total)
-            else:
-                _pair_mixed(s, w, stage, total)
-            if w.chosen[0] == w.chosen[2] and w.chosen[1] == w.chosen[3]:
-                continue  # a particle does not meet itself
-            verdict = accepted(s, w, p, stage, raised)
+            _choose_pair(s, w, stage, total)
+            verdict = collides(s, w, p, stage, raised)
             if verdict < 0:
                 return math.nan
             if verdict > 0:
-                s.count[FIRST] = w.chosen[0]
                 break
         if s.count[FIRST] < 0:  # all in vain: perhaps one particle meets only itself
             w.meta[SEEK], w.meta[STAGE] = 1, -1
