@@ -339,10 +339,8 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
                 return wait
             s.count[VAIN] += 1
             if s.count[VAIN] > _ENOUGH * s.count[PARTICLES] + PATIENCE:
+                s.held[0] = 0  # what had the largest rates may be gone
                 break
-        # what had the largest rates may be gone
-        if s.count[VAIN] > _ENOUGH * s.count[PARTICLES] + PATIENCE:
-            s.held[0] = 0
         s.count[LONE] = -1
         return wait
 
