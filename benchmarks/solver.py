@@ -41,7 +41,7 @@ CASES: tuple[tuple[str, sx.Model, float, dict[str, Any], dict[float, Any]], ...]
         "the same, 5000 sizes throughout",
         model(sx.kernels.Ballistic(), 0.01),
         10.0,
-        {"largest": 5000},
+        {"window": 5000},
         BALLISTIC,
     ),
     ("ballistic, λ = 0.01, t = 100", model(sx.kernels.Ballistic(), 0.01), 100.0, {}, BALLISTIC),

@@ -24,7 +24,7 @@ model = sx.Model(
 times = [0.3, 3, 30, 300]
 
 ds = sx.simulate(model, times, particles=20_000, replicas=8, seed=1)
-rates = sx.solve(model, times, largest=128)
+rates = sx.solve(model, times, window=128)
 
 figure = sx.plot.size_distribution(ds, reference=rates)
 sx.plot.save(figure, "becker_doring.png")

@@ -230,7 +230,7 @@ def test_becker_doering() -> None:
     """Monomers come and go one by one: ``c_k = z**k`` in equilibrium, ``z / (1 - z)^2 = 3``."""
     attach = sx.kernels.formula("max(0, 2 - min(i, j)) * (1 + max(0, 2 - max(i, j)))")
     model = sx.Model(attach, [P.Aggregation(), P.Evaporation(1.0)], sx.initial.monodisperse(3.0))
-    ds = sx.solve(model, [400.0], largest=128)
+    ds = sx.solve(model, [400.0], window=128)
     z = (7 - np.sqrt(13)) / 6
     np.testing.assert_allclose(ds["n"].values[0, 0, :20], z ** np.arange(1, 21), rtol=1e-6)
     assert z**10 == pytest.approx(3.35876812947e-3, rel=1e-10)
@@ -308,7 +308,7 @@ def test_models_as_data() -> None:
     data = model_to_dict(model)
     back = model_from_dict(data)
     assert model_to_dict(back) == data
-    one, other = (sx.solve(m, [1.0], largest=50)["moment"].values for m in (model, back))
+    one, other = (sx.solve(m, [1.0], window=50)["moment"].values for m in (model, back))
     np.testing.assert_array_equal(one, other)
 
 

@@ -181,7 +181,7 @@ def test_the_solver_sees_the_change(monkeypatch: pytest.MonkeyPatch) -> None:
         model = sx.Model(sx.kernels.from_function(by_helper), kinds)
         written = [processes.Aggregation(), processes.Fragmentation(f"{value}/(i + j)")]
         same = sx.Model(sx.kernels.formula(f"{value}*(i + j)"), written)
-        one, other = (sx.solve(m, [0.05], largest=64, method="direct") for m in (model, same))
+        one, other = (sx.solve(m, [0.05], window=64, method="direct") for m in (model, same))
         np.testing.assert_allclose(one["n"], other["n"], rtol=1e-9, atol=1e-14)
         found.append(float(one["number_density"].item()))
     assert found[0] != pytest.approx(found[1], rel=0.01)

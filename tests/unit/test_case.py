@@ -153,9 +153,9 @@ def test_times_by_a_table():
 
 def test_the_solver_alone_and_beside():
     text = GOOD.partition("[run]")[0]
-    case = parse(text + "[solve]\ntimes = [2]\nlargest = 500\n")
+    case = parse(text + "[solve]\ntimes = [2]\nwindow = 500\n")
     assert case.run is None
-    assert case.solve == Solve((2.0,), largest=500)
+    assert case.solve == Solve((2.0,), window=500)
     assert case.times == (2.0,)
     assert parse(GOOD + "[solve]\n").solve == Solve((1.0, 10.0))
 
@@ -235,7 +235,7 @@ def test_changes_are_applied_and_checked():
     assert case.run.particles == 100_000
     assert case.model.processes[1].rate == 0.5
     assert case.title == "new"
-    assert parse(GOOD, "x", ["processes.1.rate=0.5", "solve.largest=7"]).solve.largest == 7
+    assert parse(GOOD, "x", ["processes.1.rate=0.5", "solve.window=7"]).solve.window == 7
     assert parse(GOOD, "x", ["run.times=[3]"]).run.times == (3.0,)
 
 

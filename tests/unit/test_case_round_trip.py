@@ -44,7 +44,8 @@ SETTINGS = {
     "bins_per_octave": (2,),
     "distribution": (True, False), "checkpoint_every": (1, "2 min"), "time_limit": ("1 h", 5),
     "target_error": (), "target": ("M2",), "max_replicas": (20,), "subvolumes": (1, 2),
-    "remix": (0.5,), "tolerance": (1e-5,), "largest": (100,), "max_size": (200,), "gel": ("inert",),
+    "remix": (0.5,), "tolerance": (1e-5,), "window": (100,), "max_window": (200,),
+    "gel": ("inert",),
     "executor": ("threads",), "workers": (2,), "figures": ([], ["clusters"]), "report": (False,),
     # one goes with the other
     "weighting": ("mass-flow", "auto"), "exponent": (), "address": (),
@@ -94,8 +95,8 @@ def tables(draw, kernel, process, initial, si):
         if which in (name, "both"):
             own = drawn(draw, settings_, lambda key: () if key == "times" else SETTINGS[key])
             case[name] = own if name == "solve" and which == "both" else times | own
-    if "solve" in case and {"largest", "max_size"} <= set(case["solve"]):
-        del case["solve"]["max_size"]
+    if "solve" in case and {"window", "max_window"} <= set(case["solve"]):
+        del case["solve"]["max_window"]
     for name, settings_ in (("parallel", Parallel), ("output", Output)):
         if draw(st.booleans()):
             case[name] = drawn(draw, settings_, SETTINGS.__getitem__)

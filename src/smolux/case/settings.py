@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from itertools import pairwise
@@ -85,8 +86,8 @@ class Solve:
     times: tuple[float, ...]
     method: str = "auto"
     tolerance: float = 1e-8
-    largest: int | None = None
-    max_size: int | None = None
+    window: int | None = None
+    max_window: int | None = None
     gel: str = "inert"
 
     def arguments(self) -> dict[str, Any]:
@@ -195,14 +196,26 @@ def read_solve(content: Any, run_times: tuple[float, ...] | None, problems: Prob
     settings = {
         "method": table.choice("method", Solve.method, SOLVERS),
         "tolerance": table.number("tolerance", Solve.tolerance, above=0.0),
-        "largest": table.integer("largest", Solve.largest, 2, 100_000_000),
-        "max_size": table.integer("max_size", Solve.max_size, 2, 100_000_000),
+        "window": _renamed(table, "window", "largest"),
+        "max_window": _renamed(table, "max_window", "max_size"),
         "gel": table.choice("gel", Solve.gel, GELS),
     }
     if not settings["tolerance"] <= 0.1:
         table.bad("tolerance", "must be at most 0.1; 1e-8 is usual")
     table.finish()
     return Solve(times, **settings) if times else None
+
+
+def _renamed(table: Table, key: str, former: str) -> int | None:
+    """Return a number of sizes by a key, or by the one that it had before."""
+    if former not in table:
+        return table.integer(key, None, 4, 100_000_000)
+    if key in table:
+        table.bad(former, f"is called {key} now, which is given, too; take this line out")
+        table.take(former)
+        return None
+    warnings.warn(f"solve.{former} is called {key} now", DeprecationWarning, stacklevel=2)
+    return table.integer(former, None, 4, 100_000_000)
 
 
 def read_output(content: Any, problems: Problems) -> Output:

@@ -10,7 +10,7 @@ from ..case import Case, Parallel, Run
 from ..case.physics import model_tables
 from ..case.settings import as_table
 from ..case.write import value
-from ..deterministic.arguments import check as solver_settings
+from ..deterministic.arguments import checked as solver_settings
 from ..errors import InputError
 from ..executors import check_installed
 from ..plan import make_plan
@@ -53,7 +53,7 @@ def refusals(case: Case) -> list[str]:
     if case.run is not None:
         plans.append(partial(make_plan, case.model, **case.run.arguments()))
     if case.solve is not None:
-        settings = {"largest": None, "max_size": None} | case.solve_arguments()
+        settings = {"window": None, "max_window": None} | case.solve_arguments()
         plans.append(partial(solver_settings, case.model, **settings))
     found = []
     for plan in plans:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,13 +19,7 @@ Float = NDArray[np.float64]
 
 GELS = ("inert", "reacts")
 _TOLERANCES = 1e-12, 0.1
-#: largest windows by default; for the direct sum, whose cost is quadratic, see `DIRECT_LIMIT`
-_LIMIT, DIRECT_LIMIT = 1 << 20, 1 << 13
-#: where a gel forms, and where only other processes keep one from forming
-_GEL_LIMIT, _HINDERED_LIMIT = 1 << 12, 1 << 16
 _SMALLEST = 4
-#: at least so many times the largest size at the start
-_ROOM = 8
 
 
 @dataclass(frozen=True)
@@ -33,35 +28,33 @@ class Settings:
 
     Attributes
     ----------
-    limit : int
-        The largest number of sizes.
-    fixed, given : bool
-        Whether the number of sizes stays at `limit`, and whether that is the user's choice.
+    window, max_window : int or None
+        The last size, if it is fixed, and the largest that it may become, as the user gave them.
     """
 
     times: tuple[float, ...]
     method: str
     tolerance: float
-    limit: int
-    fixed: bool
-    given: bool
+    window: int | None
+    max_window: int | None
     orders: Float
     sizes: int
     bins_per_octave: int
     gel: str
 
 
-def check(
+def checked(
     model: Model,
     times: ArrayLike,
     method: str,
     tolerance: float,
-    largest: int | None,
-    max_size: int | None,
+    window: int | None,
+    max_window: int | None,
     orders: Sequence[float],
     sizes: int,
     bins_per_octave: int,
     gel: str,
+    check: bool = False,
 ) -> Settings:
     """Return the arguments of `smolux.solve` as settings; parameters as there.
 
@@ -81,12 +74,12 @@ def check(
         problems.append(
             f"tolerance = {tolerance!r}: must be a number from {low:g} to {high:g}; 1e-8 is usual"
         )
-    for what, most in (("largest", largest), ("max_size", max_size)):
+    for what, most in (("window", window), ("max_window", max_window)):
         if most is not None:
             _whole(what, most, _SMALLEST, problems)
-    if largest is not None and max_size is not None and largest != max_size:
+    if window is not None and max_window is not None:
         problems.append(
-            f"largest = {largest!r} and max_size = {max_size!r}: the first fixes the number of "
+            f"window = {window!r} and max_window = {max_window!r}: the first fixes the number of "
             "sizes, the second limits its growth: give one of them"
         )
     counts = {
@@ -99,39 +92,46 @@ def check(
         powers = orders_of_moments(orders)
     except InputError as error:
         problems += error.problems
+    if not isinstance(check, (bool, np.bool_)):
+        problems.append(f"check = {check!r}: must be True or False")
     if gel == "reacts" and isinstance(model, Model):
-        others = [p.name for p in model.processes if p.name != "aggregation"]
-        if others:
-            problems.append(
-                f"gel = 'reacts': is for aggregation alone, not with {', '.join(others)}: "
-                "what a gel would leave then is not defined; use gel='inert'"
-            )
+        problems += _beside_a_gel(model)
     if problems:
         raise InputError(problems)
-    limit = largest or max_size or _default_limit(model)
     return Settings(
         times=output,
         method=method,
         tolerance=float(tolerance),
-        limit=min(int(limit), _beyond(model)),
-        fixed=largest is not None,
-        given=largest is not None or max_size is not None,
+        window=None if window is None else int(window),
+        max_window=None if max_window is None else int(max_window),
         orders=powers,
         gel=gel,
         **counts,
     )
 
 
-def _beyond(model: Model) -> int:
-    """Return the largest size that is ever there, if particles beyond a size leave."""
-    return 1 << 62 if model.cut is None else max(model.cut, _SMALLEST)
+def _beside_a_gel(model: Model) -> list[str]:
+    others = [p.name for p in model.processes if p.name != "aggregation"]
+    return others and [
+        f"gel = 'reacts': is for aggregation alone, not with {', '.join(others)}: what a gel would "
+        "leave then is not defined; use gel='inert'"
+    ]
 
 
-def _default_limit(model: Model) -> int:
-    if not model.kernel.gels:
-        return _LIMIT
-    limit = _GEL_LIMIT if len(model.processes) == 1 else _HINDERED_LIMIT
-    return max(limit, _ROOM * model.initial.largest)
+def renamed(new: str, value: Any, old: str, former: Any) -> Any:
+    """Return the value of an argument that has a new name, whichever was given.
+
+    Raises
+    ------
+    InputError
+        If both were.
+    """
+    if former is None:
+        return value
+    if value is not None:
+        raise InputError(f"{new} = {value!r} and {old} = {former!r}: are one argument; give {new}")
+    warnings.warn(f"{old} is called {new} now", DeprecationWarning, stacklevel=3)
+    return former
 
 
 def _whole(what: str, value: Any, least: int, problems: list[str]) -> int:

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..model import Model
 from ..processes.base import PairProcess, Process
-from .beside import Beside
-from .operator import Operator, OperatorFactory
+from ..processes.daughters import Merged
+from .gel import gel_affinity
+from .meeting import Meeting
+from .operator import Direct, Operator, OperatorFactory
+from .terms import Flow, term_of
 
 Float = NDArray[np.float64]
 
 #: bands of the Jacobian, at most
 _BANDS = 32
 #: what the bands leave out may amount to so much over a step
-_LEFT_OUT = 0.3
+_LEFT_OUT = 0.1
+#: the largest window on which low rank gives way to the direct sum
+DIRECT_MOST = 1 << 13
 #: share of the mass below which there is no gel
 _NO_GEL = 1e-10
-_GEL_SIZES = 1e14, 1e15
 
 
 class Equations:
@@ -31,42 +33,73 @@ class Equations:
     ----------
     model : Model
     factory : OperatorFactory
-    largest : int
+    count : int
         The number of sizes M at first.
     mass : float
         Mass per unit volume of the whole system, for the gel.
     gel_reacts : bool
         Whether the mass beyond the window reacts with the sizes in it.
+    unit : int
+        The sizes are ``unit, 2 unit, ...``; the kernel of `factory` takes them in this unit.
+
+    Attributes
+    ----------
+    span : (float, float)
+        Times to which the factors of the processes are held: they may jump at either.
     """
 
     def __init__(
         self,
         model: Model,
         factory: OperatorFactory,
-        largest: int,
+        count: int,
         mass: float,
         gel_reacts: bool = False,
+        unit: int = 1,
     ) -> None:
         self.model, self.mass, self._factory, self._gel_reacts = model, mass, factory, gel_reacts
+        self.unit, self.span = unit, (0.0, np.inf)
         self._factors = [p.factor for p in model.processes]
         self.pairs = [p for p in model.processes if isinstance(p, PairProcess)]
-        self._beside = Beside(model)
         self.evaluations = 0
-        self.resize(largest)
+        self.resize(count)
 
-    def resize(self, largest: int) -> None:
+    def resize(self, count: int) -> None:
         """Take another number of sizes."""
-        self.largest = largest
-        self.sizes = np.arange(1.0, largest + 1.0)
-        self.operator: Operator = self._factory(largest)
-        self._bands = np.empty((largest, 0))
-        self._gel = gel_affinity(self.model, self.sizes) if self._gel_reacts else None
-        self._beside.resize(self.sizes)
+        self.count = count
+        self.sizes = self.unit * np.arange(1.0, count + 1.0)
+        self.operator: Operator = self._factory(count)
+        self._terms = [term_of(process, self.sizes) for process in self.processes]
+        self._bands, self._tilted = np.empty((count, 0)), False
+        self._gel = gel_affinity(self.model.kernel, self.sizes) if self._gel_reacts else None
+
+    def refine(self, n: Float) -> bool:
+        """Find the sums over pairs more exactly near densities `n`; False if there is no way.
+
+        By a tilt of the transforms for these densities; then, on windows where this can be, by the
+        direct sum.
+        """
+        if isinstance(self.operator, Direct) or not n.any():
+            return False
+        if not self._tilted:
+            self._tilted = True
+            self.operator.prepare(n)
+            return True
+        if self.count > DIRECT_MOST or not self._factory.may_change:
+            return False
+        self.operator = self._factory.direct_sum(self.count)
+        self._bands = np.empty((self.count, 0))
+        return True
+
+    @property
+    def cut(self) -> bool:
+        """Whether the window ends where particles leave the system at once."""
+        return self.model.cut is not None and self.count == max(self.model.cut // self.unit, 1)
 
     @property
     def quantities(self) -> int:
-        """How many quantities `rates` gives to be integrated along."""
-        return len(self.processes) + (2 if self.model.open else 0)
+        """How many quantities `rates` gives to be integrated along, see `Totals`."""
+        return len(self.processes) + 5
 
     @property
     def processes(self) -> tuple[Process, ...]:
@@ -74,7 +107,7 @@ class Equations:
         return tuple(self.model.processes)
 
     def rates(self, times: Float, n: Float) -> tuple[Float, Float]:
-        """Return ``dn/dt`` and the rates of collisions, for several densities at once.
+        """Return ``dn/dt`` and what is integrated along, for several densities at once.
 
         Parameters
         ----------
@@ -84,42 +117,53 @@ class Equations:
         Returns
         -------
         rates : ndarray of shape (S, M)
-        events : ndarray of shape (S, Q)
-            Events of each process per unit volume and time; if the system is open, the mass that
-            comes in and the mass that leaves, too.
+        along : ndarray of shape (S, Q)
+            Events of each process per unit volume and time, and the account of number and mass, see
+            `Totals`.
         """
         self.evaluations += len(n)
-        loss = n * self.operator.loss(n)
-        pairs = 0.5 * loss.sum(axis=1)
+        meeting, flow = Meeting(self.operator, self.sizes, n), Flow.none(n, len(self.processes))
+        for p, term in enumerate(self._terms):
+            term.add(p, self._factor(p, times), n, meeting, flow)
         if self._gel is not None:
-            to_gel = n * self._gel * (self.mass - n @ self.sizes)[:, None]
-            loss = loss + to_gel
-            pairs += to_gel.sum(axis=1)
-        gains: list[Float] = []
+            self._to_gel(n, self._factor(0, times), flow)
+        if self.cut:
+            flow.leave()
+        return flow.rates, flow.along
 
-        def gain(s: int) -> Float:
-            if not gains:
-                gains.append(self.operator.gain(n))
-            return gains[0][s]
+    def beyond(self, t: float, n: Float) -> Float:
+        """Return what appears per time of the sizes above the last one, up to twice that.
 
-        total, events = np.zeros_like(n), np.zeros((len(n), self.quantities))
-        for s, t in enumerate(times):
-            for p, process in enumerate(self.pairs):
-                total[s] += process.rhs(float(t), self.sizes, n[s], loss[s], partial(gain, s))
-                events[s, p] = self._factor(p, float(t)) * pairs[s]
-            if len(self.pairs) < len(self.processes):
-                factors = [self._factor(p, float(t)) for p in range(len(self.processes))]
-                total[s] += self._beside.rates(factors, n[s], events[s])
-            if self.largest == self.model.cut:  # what would lie beyond the window leaves, too
-                events[s, -1] = events[s, -2] - float(total[s] @ self.sizes)
-        return total, events
+        Nothing where it leaves the system.
+        """
+        merged = [p for p, process in enumerate(self.pairs) if _merges(process)]
+        if self.cut or not merged:
+            return np.zeros_like(n)
+        factor = sum(float(self._factor(p, np.array([t]))[0]) for p in merged)
+        return factor * self.operator.beyond(n)
 
-    def _factor(self, p: int, t: float) -> float:
-        factor = float(self._factors[p](t))
-        if not (np.isfinite(factor) and factor >= 0.0):
+    def _to_gel(self, n: Float, factor: Float, flow: Flow) -> None:
+        """Let the mass beyond the window take up particles."""
+        assert self._gel is not None
+        lost = n * self._gel * (factor * (self.mass - n @ self.sizes))[:, None]
+        events = lost.sum(axis=1)
+        flow.rates -= lost
+        flow.events[:, 0] += events
+        flow.number -= events
+        flow.over_mass += lost @ self.sizes
+
+    def _factor(self, p: int, times: Float) -> Float:
+        """Return how often a process takes place at some times, relative to its rate."""
+        law = self._factors[p]
+        if law.constant is not None:
+            return np.full(len(times), law.constant)
+        factor = np.asarray(law(np.clip(times, *self.span)), float)
+        wrong = ~(np.isfinite(factor) & (factor >= 0.0))
+        if wrong.any():
+            k = int(np.argmax(wrong))
             raise InputError(
-                f"the rate of {self.processes[p].name} is {factor:g} at t = {t:.6g}: it must be a "
-                "finite number, zero or more, up to the last output time"
+                f"the rate of {self.processes[p].name} is {factor[k]:g} at t = {times[k]:.6g}: it "
+                "must be a finite number, zero or more, up to the last output time"
             )
         return factor
 
@@ -131,9 +175,10 @@ class Equations:
 
     def shares(self, t: float) -> tuple[float, float]:
         """Return how often loss and gain enter the rates: ``1 + λ`` and 1 with shattering."""
-        nothing, one = np.zeros(2), np.array([0.0, 1.0])
-        gain = sum(float(p.rhs(t, one, nothing, nothing, lambda: one)[1]) for p in self.pairs)
-        return sum(self._factor(p, t) for p in range(len(self.pairs))), gain
+        at = np.array([t])
+        factors = [float(self._factor(p, at)[0]) for p in range(len(self.pairs))]
+        merged = sum(f for f, p in zip(factors, self.pairs, strict=True) if _merges(p))
+        return sum(factors), merged
 
     def jacobian(self, t: float, n: Float, h: float) -> tuple[Float, Float]:
         """Return the stiff part: minus its diagonal, shape (M,), and J bands below, shape (M, J).
@@ -151,14 +196,16 @@ class Equations:
 
     def lone_losses(self, t: float) -> Float:
         """Return the rate at which a particle of each size vanishes by itself, shape (M,)."""
-        if len(self.pairs) == len(self.processes):
-            return np.zeros(self.largest)
-        return self._beside.losses([self._factor(p, t) for p in range(len(self.processes))])
+        total, at = np.zeros(self.count), np.array([t])
+        for p, term in enumerate(self._terms):
+            if term.vanishing is not None:
+                total += self._factor(p, at) * term.vanishing
+        return total
 
     def _near(self, n: Float, enough: float) -> list[Float]:
         """Return the loss by near partners, together and each; `enough` of it may be missing."""
         total = self.operator.loss(n[None, :])[0]
-        most = min(_BANDS, self.largest)
+        most = min(_BANDS, self.count)
 
         def left_out(count: int) -> float:
             return float(np.max(total - self._columns(count) @ n[:count]))
@@ -175,19 +222,9 @@ class Equations:
 
     def _columns(self, count: int) -> Float:
         if self._bands.shape[1] < count:
-            self._bands = self.operator.columns(1 if count == 1 else min(_BANDS, self.largest))
+            self._bands = self.operator.columns(1 if count == 1 else min(_BANDS, self.count))
         return self._bands[:, :count]
 
 
-def gel_affinity(model: Model, sizes: Float) -> Float:
-    """Return ``lim K(k, j) / j`` for large j: the rate at which a mass of gel takes up the size k.
-
-    Zero for kernels that grow more slowly than j, ``(ij)**mu`` with mu < 1: the gel does not react.
-    """
-    small, large = (model.kernel(sizes, np.full_like(sizes, j)) / j for j in _GEL_SIZES)
-    if not np.all(np.isfinite(large)) or np.any(large > small * (1 + 1e-6)):
-        raise InputError(
-            f"gel = 'reacts': the {model.kernel.label} kernel grows faster than the size of a "
-            "partner, so the gel would take up everything at once; use gel='inert'"
-        )
-    return np.where(np.abs(large - small) <= 1e-6 * np.abs(large), large, 0.0)
+def _merges(process: PairProcess) -> bool:
+    return isinstance(process.daughters, Merged)

@@ -7,8 +7,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from .account import Account, Entry
 from .equations import Equations
 from .radau import ESTIMATE_POWER, STAGES, STEP_POWER, TABLEAU, Step, extrapolate, radau_step
+from .terms import Totals
+from .timemesh import TimeMesh, within
 from .window import Window
 
 Float = NDArray[np.float64]
@@ -22,8 +25,11 @@ _AFTER_FAILURE = 0.4
 _CAREFUL_STEPS, _CAREFUL = 8, 1.15
 #: first step: so much may change
 _FIRST_CHANGE = 0.02
-#: what begins empty has no scale of its own: the share of the first output time that is skipped
-_ENTRY = 1e-9
+#: what begins empty has no scale of its own: the share of the time that is entered with, and of
+#: the change that is not looked at then
+_ENTRY, _ENTRIES = 1e-9, 32
+#: share of the most particles that were ever there, below which there are none
+_NOTHING = 1e-100
 #: steps between two looks at how densities fall off
 _PREPARE = 4
 
@@ -35,7 +41,11 @@ class SolverError(RuntimeError):
     ----------
     time : float
         How far the solution came.
+    dataset : xarray.Dataset or None
+        What was computed; output times not reached are NaN.
     """
+
+    dataset: object = None
 
     def __init__(self, message: str, time: float) -> None:
         super().__init__(message)
@@ -60,6 +70,11 @@ class Norm:
         with np.errstate(divide="ignore", invalid="ignore"):
             return float(np.max((self._weights @ np.abs(error)) / moments))
 
+    def weights(self, n: Float) -> Float:
+        """Return what an entry of an error counts at most."""
+        moments = self._weights @ np.abs(n)
+        return np.asarray((self._weights / np.maximum(moments, 1e-300)[:, None]).max(axis=0))
+
 
 class Integrator:
     """Solution at one time, and the means to go on from there.
@@ -70,6 +85,8 @@ class Integrator:
     n : ndarray of shape (M,)
         Densities at time zero.
     window : Window
+    mesh : TimeMesh
+        Where steps must end.
     tolerance : float
         Relative error of a step, in the norm of `Norm`.
     orders : ndarray
@@ -79,30 +96,42 @@ class Integrator:
     ----------
     t : float
     n : ndarray of shape (M,)
-    collisions : ndarray of shape (Q,)
-        What is integrated along, see `Equations.rates`: events of each process per unit volume.
+    along : ndarray of shape (Q,)
+        What is integrated along, see `smolux.deterministic.terms.Totals`.
+    account : Account
     steps, rejected : int
-    corrected : float
-        Sum of the relative corrections of the mass, see `_conserve`.
     """
 
     def __init__(
-        self, equations: Equations, n: Float, window: Window, tolerance: float, orders: Float
+        self,
+        equations: Equations,
+        n: Float,
+        window: Window,
+        mesh: TimeMesh,
+        tolerance: float,
+        orders: Float,
     ) -> None:
-        self.equations, self.n, self.window, self.tolerance = equations, n, window, tolerance
-        self._orders = orders
+        self.equations, self.n, self.window, self.mesh = equations, n, window, mesh
+        self.tolerance, self._orders = tolerance, orders
         self.t = 0.0
-        self.collisions = np.zeros(equations.quantities)
+        self.along = np.zeros(equations.quantities)
         self.steps = self.rejected = 0
-        self.corrected = 0.0
+        self.account = Account(tolerance, float(n.sum()), float(n @ equations.sizes))
         #: the estimate is of lower order than the step (Hairer and Wanner 1996, section IV.8)
         self._allowed = 0.1 * tolerance ** (ESTIMATE_POWER / STEP_POWER)
-        self._before: tuple[float, Float] | None = None
         self._norm = Norm(orders, equations.sizes)
-        equations.operator.prepare(n)
-        self._start = self._rates()
         self._h = self._smallest = 0.0
         self._careful = 0
+        #: share of the highest moment that flows over the edge per time
+        self._flow = 0.0
+        self._most = float(n.sum())
+        equations.operator.prepare(n)
+        self._begin()
+
+    @property
+    def totals(self) -> Totals:
+        """What was integrated along, by name."""
+        return Totals.of(self.along)
 
     def advance(self, end: float, stop: Callable[[], None] = lambda: None) -> None:
         """Take steps up to the time `end`; `stop` is called after each.
@@ -110,13 +139,34 @@ class Integrator:
         Raises
         ------
         SolverError
-            If the step length falls to nothing, with the time reached.
+            If the step length falls to nothing, or if number and mass do not come out as what the
+            processes make and take, with the time reached.
         """
-        if self._h == 0.0 and self.t < end:
-            if not self.n.any():
-                self._enter(end)
+        while self.t < end:
+            low, high = self.mesh.piece(self.t)
+            if self.t == low:
+                self._begin()
+            self._cross(min(end, high), stop)
+        problem = self.account.problem
+        if problem is not None:
+            raise SolverError(
+                f"the solution ends at t = {self.t:.8g}: {problem}: take a smaller tolerance, or "
+                "method='direct'",
+                self.t,
+            )
+
+    def _begin(self) -> None:
+        """Begin a piece of time at the present time: the rates may have jumped."""
+        self.equations.span = within(*self.mesh.piece(self.t))
+        self._before: tuple[float, Float] | None = None
+        self._start = self._rates()
+
+    def _cross(self, end: float, stop: Callable[[], None]) -> None:
+        """Take steps up to a time before which the factors do not jump."""
+        if not self.n.any() and not self._enter(end):
+            self.t = end
+        if self.t < end and not 0.0 < self._h < np.inf:
             self._h = self._first_step(end)
-            self._smallest = 1e-12 * self._h
         while self.t < end:
             left = end - self.t
             if self._h >= left * (1 - 1e-9):
@@ -127,20 +177,45 @@ class Integrator:
                 self._attempt(h, self.t + h)
             if self._h < max(self._smallest, 1e-14 * self.t):
                 raise self._failure()
+            if not self.n.any():
+                return
             stop()
 
-    def _enter(self, end: float) -> None:
-        """Go from no particles at all to the first ones, which do not meet yet."""
-        rates, along = self.equations.rates(np.array([self.t]), self.n[None, :])
-        self.t = _ENTRY * end
-        self.n, self.collisions = self.t * rates[0], self.collisions + self.t * along[0]
-        self._start = self._rates()
+    def _enter(self, end: float) -> bool:
+        """Go from no particles at all to the first ones, which hardly meet yet.
+
+        Return False if nothing comes in up to `end`.
+        """
+        h = _ENTRY * (end - self.t)
+        for _ in range(_ENTRIES):
+            times = self.t + h * TABLEAU.nodes
+            come, along = self.equations.rates(times, np.zeros((STAGES, len(self.n))))
+            n = h * (TABLEAU.matrix[-1] @ come)
+            if not n.any():
+                # nothing at the beginning of the piece: at its end?
+                if h >= 0.5 * (end - self.t):
+                    return False
+                h = min(1e3 * h, end - self.t)
+                continue
+            rates, _ = self.equations.rates(times[-1:], n[None, :])
+            ignored = self._norm(h * (rates[0] - come[-1]), n)
+            if ignored <= _ENTRY:
+                break
+            h *= max(_ENTRY / ignored, 1e-6)
+        self.t += h
+        self.n, self.along = n, self.along + h * (TABLEAU.matrix[-1] @ along)
+        self._most = max(self._most, float(n.sum()))
+        self._start, self._h = self._rates(), 0.0
+        return True
 
     def _first_step(self, end: float) -> float:
         change = self._norm(self._start, self.n)
         if not np.isfinite(change):
             raise self._failure()
-        return min(end, _FIRST_CHANGE / change) if change > 0 else 0.01 * end
+        left = end - self.t
+        h = min(left, _FIRST_CHANGE / change) if change > 0 else 0.01 * left
+        self._smallest = 1e-12 * h
+        return h
 
     def _failure(self) -> SolverError:
         finite = bool(np.isfinite(self._start).all())
@@ -151,6 +226,15 @@ class Integrator:
         )
         return SolverError(f"the solution ends at t = {self.t:.8g}: {reason}", self.t)
 
+    def _open(self, text: str) -> SolverError:
+        """Return what is raised if the account does not close."""
+        return SolverError(
+            f"the solution ends at t = {self.t:.8g}: number and mass of the terms do not add up: "
+            f"{text}, on {len(self.n)} sizes with a {self.equations.operator.name} sum over pairs; "
+            "take method='direct', or a larger tolerance",
+            self.t,
+        )
+
     def _rates(self) -> Float:
         return self.equations.rates(np.array([self.t]), self.n[None, :])[0][0]
 
@@ -160,8 +244,9 @@ class Integrator:
         if self._before is not None:
             guess = extrapolate(self._before[1], h / self._before[0])
         step = radau_step(
-            self.equations, self.t, self.n, h, self._start, guess, self._norm, self.tolerance
-        )
+            self.equations, self.t, self.n, h, self._start, guess, self._norm, self.tolerance,
+            self._kept,
+        )  # fmt: skip
         if step is None:
             self.rejected += 1
             self._h, self._careful = _AFTER_FAILURE * h, _CAREFUL_STEPS
@@ -177,51 +262,63 @@ class Integrator:
             self.rejected += 1
             self._h = h * float(np.clip(factor, _LEAST, 1.0)) if np.isfinite(error) else 0.1 * h
             return
-        largest, again = self.window.next(n)
+        self._flow = self.window.share(n, self.equations.beyond(end, n))
+        count, again = self.window.next(len(n), self._flow, end, h)
         if again:
             self.rejected += 1
-            self._resize(largest)
+            self._resize(count)
             self._h = h
+            return
+        if not self._entered(step, n, h):
             return
         self._accept(step, n, h, end)
         proposed = h * float(np.clip(factor, _LEAST, _MOST))
         # a step cut short at an output time says little of longer ones
         self._h = max(proposed, self._h) if h < self._h and factor > 1 else proposed
-        if largest > len(n):
-            self._resize(largest)
+        if count > len(n):
+            self._resize(count)
         if self.steps % _PREPARE == 0:
             self.equations.operator.prepare(self.n)
 
+    @property
+    def _kept(self) -> Float | None:
+        """Weights of the densities whose sum does not change: the sizes, while nothing leaves."""
+        stays = self._flow <= self.tolerance and self.equations.conserves(self.n)
+        return self.equations.sizes if stays else None
+
+    def _entered(self, step: Step, n: Float, h: float) -> bool:
+        """Enter a step into the account; False if its sums over pairs are to be found anew."""
+        sizes, totals = self.equations.sizes, Totals.of(step.along)
+        flow = h * (TABLEAU.matrix[-1] @ step.rates)
+        number = Entry(float(self.n.sum()), float(n.sum()), float(flow.sum()), totals.number)
+        mass = Entry(float(self.n @ sizes), float(n @ sizes), float(flow @ sizes), totals.mass)
+        if not self.account.closes(number, mass):
+            if self.equations.refine(self.n):
+                self.rejected += 1
+                self._begin()
+                return False
+            raise self._open(f"{max(number.apart, mass.apart):.1e} in a step")
+        self.account.add(number, mass)
+        return True
+
     def _accept(self, step: Step, n: Float, h: float, end: float) -> None:
-        self.n = self._conserve(n, step, h)
-        self.t = end
+        self.n, self.t = n, end
         self.steps += 1
         self._careful = max(0, self._careful - 1)
-        self.collisions = self.collisions + step.along
+        self.along = self.along + step.along
         self._before = h, step.change
         self._start = step.rates[-1]
+        number = float(np.abs(n).sum())
+        self._most = max(self._most, number)
+        if number < _NOTHING * self._most:  # below it nothing is told from rounding any more
+            self.n = np.zeros_like(n)
 
-    def _conserve(self, n: Float, step: Step, h: float) -> Float:
-        """Give the densities the mass that they had, less what left the window.
-
-        The iteration ends when its error is small in `Norm`; what is left of it in the mass is
-        taken out by a factor. While the tail of the window is empty, nothing leaves.
-        """
-        sizes = self.equations.sizes
-        mass, now = float(self.n @ sizes), float(n @ sizes)
-        if not (self.equations.conserves(self.n) and self.window.empty(n)):
-            mass += h * float(TABLEAU.matrix[-1] @ (step.rates @ sizes))
-        if not (mass > 0 and now > 0):
-            return n
-        self.corrected += abs(mass / now - 1.0)
-        return n * (mass / now)
-
-    def _resize(self, largest: int) -> None:
+    def _resize(self, count: int) -> None:
         """Add sizes, all empty."""
-        more = largest - len(self.n)
+        more = count - len(self.n)
         if more == 0:
             return
-        self.equations.resize(largest)
+        self.equations.resize(count)
         self._norm = Norm(self._orders, self.equations.sizes)
         self.n = np.pad(self.n, (0, more))
         if self._before is not None:

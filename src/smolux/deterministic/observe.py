@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..processes.base import PairProcess, Process
 from ..records import Records
+from .terms import Totals
 
 Float = NDArray[np.float64]
 
@@ -21,11 +22,14 @@ class Snapshot:
     Attributes
     ----------
     window : int
-        The number of sizes M.
+        The last size.
     mass : float
         Mass in the window.
     mass_error : float
-        Relative difference from that at the start, with what came in and without what left.
+        By what share of the whole mass, with what came in, that in the window differs from what it
+        would be if none went beyond the last size.
+    beyond : float
+        What share of it went there by the account.
     negative : float
         The most negative density over the number density; zero if there is none.
     """
@@ -34,10 +38,11 @@ class Snapshot:
     n_bin: Float
     moment: Float
     number_density: float
-    collisions: Float
+    totals: Totals
     window: int
     mass: float
     mass_error: float
+    beyond: float
     negative: float
 
 
@@ -70,27 +75,29 @@ class Observer:
         #: the same bins as those of `smolux.simulate`
         self.edges = np.unique([int(first * 2.0 ** (k / bins_per_octave)) for k in steps])
 
-    def __call__(self, n: Float, collisions: Float) -> Snapshot:
+    def __call__(self, n: Float, sizes: Float, totals: Totals) -> Snapshot:
         """Take a snapshot; densities below zero, which are rounding noise, are set to zero."""
         total = float(n.sum())
         negative = float(min(n.min(), 0.0)) / total if total > 0 else 0.0
         n = np.maximum(n, 0.0)
-        k = np.arange(1.0, len(n) + 1.0)
-        come, gone = collisions[len(self.processes) :] if self._open else (0.0, 0.0)
-        expected = self.mass + come - gone
+        whole = self.mass + totals.mass_in
+        expected = whole - totals.mass_out
         exact = np.zeros(self.sizes)
-        exact[: min(self.sizes, len(n))] = n[: self.sizes]
-        used = int(np.searchsorted(self.edges, len(n), side="right"))
-        bins = np.add.reduceat(n, self.edges[:used] - 1) if used else np.empty(0)
+        few = int(np.searchsorted(sizes, self.sizes, side="right"))
+        exact[sizes[:few].astype(np.int64) - 1] = n[:few]
+        used = int(np.searchsorted(self.edges, sizes[-1], side="right"))
+        place = np.searchsorted(self.edges, sizes[few:], side="right") - 1
+        mass = float(n @ sizes)
         return Snapshot(
             n=exact,
-            n_bin=bins,
-            moment=np.array([float(n @ k**p) for p in self.orders]),
+            n_bin=np.bincount(place, n[few:], minlength=used)[:used].astype(float),
+            moment=np.array([float(n @ sizes**p) for p in self.orders]),
             number_density=total,
-            collisions=collisions.copy(),
-            window=len(n),
-            mass=float(n @ k),
-            mass_error=float(n @ k) / expected - 1.0 if expected > 0.0 else 0.0,
+            totals=totals,
+            window=int(sizes[-1]),
+            mass=mass,
+            mass_error=(mass - expected) / whole if whole > 0.0 else 0.0,
+            beyond=totals.over_mass / whole if whole > 0.0 else 0.0,
             negative=negative,
         )
 
@@ -127,8 +134,8 @@ class Observer:
         records.volume[0, len(shots) :] = np.nan
         for t, shot in enumerate(shots):
             records.number_density[0, t] = shot.number_density
-            records.collisions[0, t] = shot.collisions[pairs].sum()
-            records.events[0, t] = shot.collisions[: len(processes)]
+            records.collisions[0, t] = shot.totals.events[pairs].sum()
+            records.events[0, t] = shot.totals.events
             records.moment[0, t] = shot.moment
             records.n[0, t] = shot.n
             records.n_bin[0, t] = 0.0
@@ -137,7 +144,7 @@ class Observer:
             inside, come, gone = filled(), filled(), filled()
             for t, shot in enumerate(shots):
                 inside[0, t] = shot.mass
-                come[0, t], gone[0, t] = shot.collisions[len(processes) :]
+                come[0, t], gone[0, t] = shot.totals.mass_in, shot.totals.mass_out
             records.balance = inside, come, gone
         records.attributes["mass_error"] = [s.mass_error for s in shots]
         records.attributes["window"] = [s.window for s in shots]

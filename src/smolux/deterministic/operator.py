@@ -46,6 +46,15 @@ class Operator(Protocol):
     def gain(self, n: Float) -> Float:
         """Return ``sum_{i+j=k} K(i, j) n_i n_j / 2``, shape (S, M) as `n`."""
 
+    def gain_and_over(self, n: Float) -> tuple[Float, tuple[Float, Float] | None]:
+        """Return the gain, and number and mass of pairs larger than M together, shape (S,) each.
+
+        None for these if they are only what the others leave.
+        """
+
+    def beyond(self, n: Float) -> Float:
+        """Return the gain of the sizes ``M + 1 .. 2 M`` for densities of shape (M,)."""
+
     def columns(self, count: int) -> Float:
         """Return ``K(i, j)`` for all i and ``j = 1 .. count``, shape (M, count)."""
 
@@ -112,6 +121,23 @@ class Direct:
                 total[s, start + 1 :] += np.einsum("r,rc,rc->c", n[s, a:b], sheared, shifted)
         return total
 
+    def gain_and_over(self, n: Float) -> tuple[Float, None]:
+        """See `Operator.gain_and_over`."""
+        return self.gain(n), None
+
+    def beyond(self, n: Float) -> Float:
+        """See `Operator.beyond`; rows shifted by one each have a size in a column."""
+        m = self.largest
+        total = np.zeros(2 * m)
+        for a, block in self._cache or self._blocks():
+            rows = len(block)
+            shifted = np.zeros((rows, m + rows))
+            shifted[:, :m] = (0.5 * n[a : a + rows, None]) * block * n
+            width = m + rows - 1
+            sums = shifted.ravel()[: rows * width].reshape(rows, width).sum(axis=0)
+            total[a + 1 : a + 1 + width] += sums
+        return total[m:]
+
     def columns(self, count: int) -> Float:
         """See `Operator.columns`."""
         sizes = np.arange(1.0, self.largest + 1.0)
@@ -143,6 +169,7 @@ class LowRank:
         self.largest = m = gain.rows.shape[1]
         self._length = fft.next_fast_len(2 * m - 1, real=True)
         self.sizes = np.arange(1.0, m + 1.0)
+        self._beyond = np.arange(m + 1.0, 2.0 * m + 1.0)
         diagonal = np.diag(gain.core)
         self._diagonal = diagonal if np.array_equal(gain.core, np.diag(diagonal)) else None
         self._tilt(0.0)
@@ -153,6 +180,20 @@ class LowRank:
 
     def gain(self, n: Float) -> Float:
         """See `Operator.gain`."""
+        return self._all(n)[:, : self.largest]
+
+    def gain_and_over(self, n: Float) -> tuple[Float, tuple[Float, Float]]:
+        """See `Operator.gain_and_over`: the transforms are long enough to hold all sums."""
+        total = self._all(n)
+        beyond = total[:, self.largest :]
+        return total[:, : self.largest], (beyond.sum(axis=1), beyond @ self._beyond)
+
+    def beyond(self, n: Float) -> Float:
+        """See `Operator.beyond`."""
+        return self._all(n[None, :])[0, self.largest :]
+
+    def _all(self, n: Float) -> Float:
+        """Return the gain of the sizes ``1 .. 2 M``."""
         if self.rank * n.size <= _BATCH:
             return self._convolve(n)
         return np.concatenate([self._convolve(row[None, :]) for row in n])
@@ -167,8 +208,8 @@ class LowRank:
             spectrum *= mixed.view(complex).reshape(spectrum.shape)
             product = spectrum.sum(axis=0).view(float)
         back = fft.irfft(product.view(complex).reshape(len(n), -1), self._length, overwrite_x=True)
-        total = np.zeros_like(n)
-        np.multiply(back[:, : self.largest - 1], self._back[1:], out=total[:, 1:])
+        total = np.zeros((len(n), 2 * self.largest))
+        np.multiply(back[:, : 2 * self.largest - 1], self._back[1:], out=total[:, 1:])
         return total
 
     def columns(self, count: int) -> Float:
@@ -212,7 +253,8 @@ class LowRank:
     def _tilt(self, theta: float) -> None:
         self.theta, m = theta, self.largest
         self._rows = self._gain.rows * np.exp(theta * (self.sizes - 0.5 * m))
-        self._back = 0.5 * self.sizes**self._gain.power * np.exp(-theta * (self.sizes - m))
+        all_sizes = np.concatenate([self.sizes, self._beyond])
+        self._back = 0.5 * all_sizes**self._gain.power * np.exp(-theta * (all_sizes - m))
 
 
 def _minimise(
@@ -254,6 +296,15 @@ class OperatorFactory:
         self.kernel, self.method = kernel, method
         self.tolerance = float(np.clip(tolerance, 1e-13, 1e-6))
         self.notes: list[str] = []
+
+    @property
+    def may_change(self) -> bool:
+        """Whether the direct sum may be taken where low rank is not exact enough."""
+        return self.method == "auto"
+
+    def direct_sum(self, largest: int) -> Direct:
+        """Return the direct sum for the sizes ``1 .. largest``."""
+        return Direct(self.kernel, largest)
 
     @property
     def direct(self) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -17,8 +17,21 @@ STAGES = 4
 _MAX_ITERATIONS = 10
 #: the iteration error may be this share of the tolerance
 _ITERATION_SHARE = 0.05
-#: contraction above which a step is given up
-_SLOW = 0.8
+#: mean contraction above which a step is given up, after so many iterations
+_SLOW, _PATIENCE = 0.8, 3
+#: ratio of two corrections above which iterates are mixed, of so many before
+_MIXED, _DEPTH = 0.15, 5
+
+
+@runtime_checkable
+class Weighted(Protocol):
+    """A norm that says what an entry counts."""
+
+    def __call__(self, error: Float, n: Float) -> float:
+        """Return the norm of `error` relative to the densities `n`."""
+
+    def weights(self, n: Float) -> Float:
+        """Return about what an entry of an error counts in the norm, shape (M,)."""
 
 
 class Rates(Protocol):
@@ -112,12 +125,15 @@ def radau_step(
     guess: Float,
     norm: Callable[[Float, Float], float],
     tolerance: float,
+    kept: Float | None = None,
 ) -> Step | None:
     """Solve for one step of the collocation method Radau IIA with four stages.
 
     The stages solve ``Z = h Q f(n + Z)``. The iteration ``Z <- Z + (1 - h Q x A)^{-1} r`` with the
     residual r takes for A the bands that `Rates.jacobian` gives, so that the linear systems are
-    triangular and banded, one for each pair of conjugate eigenvalues of Q.
+    triangular and banded, one for each pair of conjugate eigenvalues of Q. Where a weighted sum of
+    the densities never changes, A is completed by what makes this true of it, too: then every
+    iterate keeps the sum to rounding, and the solution of the stages is what it was.
 
     Parameters
     ----------
@@ -132,6 +148,8 @@ def radau_step(
         ``norm(error, n)`` relative to the densities.
     tolerance : float
         For the error of the step; a twentieth of it is allowed to the iteration.
+    kept : ndarray of shape (M,), optional
+        Weights w with ``w f(n) = 0`` for all n.
 
     Returns
     -------
@@ -146,7 +164,8 @@ def radau_step(
     diagonal, band = problem.jacobian(t, n, h)
     systems = [_Triangular(diagonal, band, h, value) for value in TABLEAU.values]
     times = t + h * TABLEAU.nodes
-    change, previous, contraction = guess.copy(), np.inf, 0.0
+    change, previous, first, contraction = guess.copy(), np.inf, 0.0, 0.0
+    mixing = Mixing(norm.weights(n)) if isinstance(norm, Weighted) else None
     for iteration in range(1, _MAX_ITERATIONS + 1):
         rates, along = problem.rates(times, n + change)
         residual = h * (TABLEAU.matrix @ rates) - change
@@ -154,17 +173,23 @@ def radau_step(
         for s, system in enumerate(systems):
             part = system.solve(TABLEAU.inverse[s] @ residual)
             correction += TABLEAU.twice[s] * np.outer(TABLEAU.vectors[:, s], part).real
-        change += correction
+        if kept is not None:
+            correction += np.outer(residual @ kept - correction @ kept, n / float(n @ kept))
         size = max(norm(row, n) for row in correction)
         if not np.isfinite(size):
             return None
         ratio = size / previous if np.isfinite(previous) and previous > 0 else 0.0
-        contraction = max(contraction, ratio)
-        if ratio >= _SLOW:
-            return None
+        first = first or size
+        change += correction if mixing is None else mixing(change, correction, ratio)
+        # what is smaller than needed may be rounding, which does not contract
+        enough = _ITERATION_SHARE * tolerance
+        if size > enough and iteration > 1:
+            contraction = (size / first) ** (1.0 / (iteration - 1))
+            if iteration > _PATIENCE and contraction >= _SLOW:
+                return None
         # without a ratio yet, a tenth is assumed
-        ahead = ratio / (1.0 - ratio) if iteration > 1 else 10.0
-        if ahead * size <= _ITERATION_SHARE * tolerance:
+        ahead = min(ratio, _SLOW) / (1.0 - min(ratio, _SLOW)) if iteration > 1 else 10.0
+        if ahead * size <= enough:
             break
         previous = size
     else:
@@ -173,6 +198,40 @@ def radau_step(
     defect = gamma * h * (start - TABLEAU.at_start @ rates)
     error = _Triangular(diagonal, band, h, gamma).solve(defect).real
     return Step(change, error, rates, h * (TABLEAU.matrix[-1] @ along), iteration, contraction)
+
+
+class Mixing:
+    """Anderson's mixing of the iterates of ``Z <- Z + c(Z)``, for directions that hardly contract.
+
+    The next iterate is that combination of the last ones for which the corrections, taken to be
+    linear, come out least: as by GMRES, without further evaluations.
+
+    Parameters
+    ----------
+    weights : ndarray of shape (M,)
+        Of an entry in the norm.
+
+    References
+    ----------
+    H. F. Walker and P. Ni, SIAM J. Numer. Anal. 49, 1715 (2011), doi:10.1137/10078356X.
+    """
+
+    def __init__(self, weights: Float) -> None:
+        self._weights = weights
+        self._iterates: list[Float] = []
+        self._corrections: list[Float] = []
+
+    def __call__(self, iterate: Float, correction: Float, ratio: float) -> Float:
+        """Return what to add to an iterate, given its correction, the `ratio` of the last times."""
+        self._iterates.append(iterate.copy())
+        self._corrections.append(correction)
+        if ratio < _MIXED:
+            return correction
+        del self._iterates[: -_DEPTH - 1], self._corrections[: -_DEPTH - 1]
+        x, c = np.diff(self._iterates, axis=0), np.diff(self._corrections, axis=0)
+        scaled = (c * self._weights).reshape(len(c), -1).T
+        gamma = np.linalg.lstsq(scaled, (correction * self._weights).ravel(), rcond=1e-10)[0]
+        return correction - np.tensordot(gamma, x + c, 1)
 
 
 class _Triangular:

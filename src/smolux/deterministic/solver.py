@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,13 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from ..content import frozen
 from ..errors import InputError, Interrupted
 from ..model import Model
+from ..processes import Source
 from ..results import to_dataset, told
-from .arguments import DIRECT_LIMIT, Settings, check
+from .arguments import Settings, checked, renamed
 from .equations import Equations
-from .integrate import Integrator
+from .gel import may_gel
+from .integrate import Integrator, SolverError
+from .lattice import on_multiples
 from .observe import Observer, Snapshot
 from .operator import OperatorFactory
-from .window import Window
+from .terms import unit_of
+from .timemesh import TimeMesh
+from .window import Window, usual_limit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,13 +77,16 @@ def solve(
     *,
     method: str = "auto",
     tolerance: float = 1e-8,
-    largest: int | None = None,
-    max_size: int | None = None,
+    window: int | None = None,
+    max_window: int | None = None,
     orders: Sequence[float] = (0, 1, 2, 3),
     sizes: int = 1024,
     bins_per_octave: int = 4,
     gel: str = "inert",
+    check: bool = False,
     progress: Callable[[Progress], None] | None = None,
+    largest: int | None = None,
+    max_size: int | None = None,
 ) -> xr.Dataset:
     """Solve the rate equations of a model: the limit of `simulate` for many particles.
 
@@ -95,12 +103,12 @@ def solve(
     tolerance : float
         Relative error allowed in a time step, in a norm that bounds the errors of all moments of
         orders 0 to 3. The error of the result is about as large.
-    largest : int, optional
-        Keep the sizes ``1 .. largest`` only; if left out, the number of sizes grows with the
-        clusters.
-    max_size : int, optional
-        The most sizes it may grow to; if left out 2**20, for the direct sum 2**13, and 2**12
-        where a gel forms.
+    window : int, optional
+        Keep the sizes ``1 .. window`` only; if left out, the number of sizes grows with the
+        clusters: before what merges beyond the last size matters.
+    max_window : int, optional
+        The largest size it may grow to; if left out there are 2**20 sizes at most, for the direct
+        sum 2**13, and 2**12 where a gel forms.
     orders : sequence of float
         Orders p of the moments ``M_p = sum_k k**p n_k``.
     sizes : int
@@ -112,23 +120,32 @@ def solve(
         part: the solution of Stockmayer. Or it reacts with the sizes below at the rate that the
         kernel has for very large partners: the solution of Flory, to which `simulate` tends; for
         aggregation alone.
+    check : bool
+        Solve once more, at a tenfold tolerance and on another window, and keep the difference: the
+        variable ``error`` over ``time``.
     progress : callable, optional
         Called with a `Progress` a few times a second.
+    largest, max_size : int, optional
+        Former names of `window` and `max_window`.
 
     Returns
     -------
     xarray.Dataset
         As from `simulate`, with one replica, the volume 1 and collisions per unit volume;
-        ``particles`` and ``largest`` are NaN. The attribute ``mass_error`` lists, for each time, by
-        what share the mass in the window differs from that at the start, and ``window`` the number
-        of sizes.
+        ``particles`` and ``largest`` are NaN. Attributes: ``mass_error`` lists, for each time, by
+        what share of all mass, with what came in, that in the window differs from what it would be
+        if none went beyond the last size; ``mass_beyond`` what share went there, ``window`` the
+        last size. ``number_defect`` and ``mass_defect`` tell by what share of all that was ever
+        there densities differ from the account of what the processes make and take.
 
     Raises
     ------
     InputError
-        With every mistake in the arguments; or when a rate becomes negative.
+        With every mistake in the arguments; or when a rate becomes negative: then with the dataset
+        of what was reached.
     SolverError
-        If the solution cannot be continued, with the time reached.
+        If the solution cannot be continued, or if number and mass do not come out as they must:
+        with the time reached and the dataset.
     Interrupted
         On Ctrl-C; holds the dataset of what was reached.
 
@@ -150,58 +167,110 @@ def solve(
     >>> round(float(ds["number_density"].item()), 8)
     0.5
     """
-    settings = check(
-        model, times, method, tolerance, largest, max_size, orders, sizes, bins_per_octave, gel
-    )
+    window = renamed("window", window, "largest", largest)
+    max_window = renamed("max_window", max_window, "max_size", max_size)
+    settings = checked(
+        model, times, method, tolerance, window, max_window, orders, sizes, bins_per_octave, gel,
+        check,
+    )  # fmt: skip
     model = frozen(model)
-    started = time.perf_counter()
-    run = _Run(model, settings, progress)
-    try:
-        run.finish()
-    except KeyboardInterrupt:
-        dataset = to_dataset(model, run.records(time.perf_counter() - started))
-        reached = run.integrator.t
-        raise Interrupted(f"stopped at t = {reached:.6g}", dataset) from None
-    return told(to_dataset(model, run.records(time.perf_counter() - started)))
+    dataset = Run(model, settings, progress).dataset()
+    if check:
+        dataset = with_error(dataset, model, settings)
+    return told(dataset)
 
 
-class _Run:
-    """A solution on its way."""
+class Run:
+    """A solution on its way.
+
+    Parameters
+    ----------
+    model : Model
+        Frozen.
+    settings : Settings
+    progress : callable, optional
+    room : int
+        The first window is so many times larger than usual.
+    """
 
     def __init__(
-        self, model: Model, settings: Settings, progress: Callable[[Progress], None] | None
+        self,
+        model: Model,
+        settings: Settings,
+        progress: Callable[[Progress], None] | None = None,
+        room: int = 1,
     ) -> None:
         self.model, self.settings, self.progress = model, settings, progress
         self.shots: list[Snapshot] = []
         self.started = self.told = time.perf_counter()
-        self.factory = OperatorFactory(model.kernel, settings.method, 0.1 * settings.tolerance)
-        self.limit = settings.limit
-        if not settings.given and self.limit > DIRECT_LIMIT and self.factory.direct:
-            self.limit = max(DIRECT_LIMIT, 2 * model.initial.largest)
-        order = max(3.0, float(settings.orders.max()))
-        window = Window(self.limit, order, settings.tolerance, settings.fixed)
-        start = model.initial.largest
-        if start > self.limit and not settings.fixed:
-            raise InputError(
-                f"max_size = {self.limit}: the initial sizes reach {start}; "
-                "raise max_size, or give largest to leave out what lies beyond it"
-            )
-        sizes = window.first(start)
-        n = model.initial.densities(max(sizes, start))
-        mass = float(n @ np.arange(1.0, len(n) + 1.0))
-        self.equations = Equations(model, self.factory, sizes, mass, settings.gel == "reacts")
+        start = model.initial.densities(model.initial.largest)
+        unit = unit_of(model, start)
+        kernel = on_multiples(model.kernel, unit)
+        self.factory = OperatorFactory(kernel, settings.method, 0.1 * settings.tolerance)
+        window = self._window(unit)
+        count = min(room * window.first(largest_size(model) // unit), window.limit)
+        n = np.zeros(count)
+        inside = start[unit - 1 :: unit][:count]
+        n[: len(inside)] = inside
+        mass = float(start @ np.arange(1.0, len(start) + 1.0))
+        reacts = settings.gel == "reacts"
+        self.equations = Equations(model, self.factory, count, mass, reacts, unit)
+        laws = [process.factor for process in model.processes]
+        self.integrator = Integrator(
+            self.equations,
+            n,
+            window,
+            TimeMesh.of(laws, settings.times[-1], settings.tolerance),
+            settings.tolerance,
+            settings.orders,
+        )
         self.observer = Observer(
             settings.orders, settings.sizes, settings.bins_per_octave, mass, model.processes
         )
-        self.integrator = Integrator(
-            self.equations, n[:sizes], window, settings.tolerance, settings.orders
-        )
 
-    def finish(self) -> None:
-        """Go through the output times."""
-        for t in self.settings.times:
-            self.integrator.advance(t, self._tell)
-            self.shots.append(self.observer(self.integrator.n, self.integrator.collisions))
+    def _window(self, unit: int) -> Window:
+        """Return the rules for the number of sizes, which are multiples of the unit."""
+        model, settings, cut = self.model, self.settings, self.model.cut
+        largest, given = largest_size(model), settings.window or settings.max_window
+        if given is None:
+            hindered = len(model.processes) > 1
+            limit = usual_limit(
+                largest // unit, may_gel(model.kernel), hindered, self.factory.direct
+            )
+        else:
+            limit = max(given // unit, 1)
+        if cut is not None:  # nothing is ever larger
+            limit = min(limit, max(cut // unit, 1))
+        most = given or limit * unit
+        if largest > most and settings.window is None:
+            raise InputError(
+                f"max_window = {most}: sizes reach {largest} at the start or from a "
+                "source; raise max_window, or give window to leave out what lies beyond it"
+                if given is not None
+                else f"initial, source: sizes reach {largest}, and there are {limit} sizes at "
+                "most; measure sizes in a larger unit, or give window to leave out what lies "
+                "beyond it"
+            )
+        order = max(3.0, float(settings.orders.max()))
+        return Window(limit, order, settings.tolerance, settings.window is not None)
+
+    def dataset(self) -> xr.Dataset:
+        """Go through the output times; what was reached comes with what ends it."""
+        try:
+            for t in self.settings.times:
+                self.integrator.advance(t, self._tell)
+                run = self.integrator
+                self.shots.append(self.observer(run.n, self.equations.sizes, run.totals))
+        except KeyboardInterrupt:
+            message = f"stopped at t = {self.integrator.t:.6g}"
+            raise Interrupted(message, self._dataset()) from None
+        except (InputError, SolverError) as error:
+            error.dataset = self._dataset()
+            raise
+        return self._dataset()
+
+    def _dataset(self) -> xr.Dataset:
+        return to_dataset(self.model, self.records(time.perf_counter() - self.started))
 
     def _tell(self) -> None:
         now = time.perf_counter()
@@ -218,7 +287,7 @@ class _Run:
                 seconds_left=seconds * (1.0 / fraction - 1.0) if fraction > 0 else np.nan,
                 compile_seconds=0.0,
                 time=self.integrator.t,
-                window=self.equations.largest,
+                window=int(self.equations.sizes[-1]),
             )
         )
 
@@ -237,7 +306,11 @@ class _Run:
             "steps": self.integrator.steps,
             "rejected_steps": self.integrator.rejected,
             "rate_evaluations": self.equations.evaluations,
-            "mass_correction": self.integrator.corrected,
+            "unit": self.equations.unit,
+            "mass_beyond": [shot.beyond for shot in self.shots],
+            "number_defect": self.integrator.account.number,
+            "mass_defect": self.integrator.account.mass,
+            "terms_defect": self.integrator.account.apart,
             "wall_seconds": seconds,
             "complete": len(self.shots) == len(self.settings.times),
         }
@@ -248,12 +321,11 @@ class _Run:
         found = [*self.model.initial.remarks, *self.factory.notes]
         tolerance = self.settings.tolerance
         late = [t for t, shot in zip(self.settings.times, self.shots, strict=False)
-                if abs(shot.mass_error) > tolerance]  # fmt: skip
+                if shot.beyond > tolerance]  # fmt: skip
         if late:
-            worst = self.shots[-1].mass_error
             found.append(
-                f"from t = {late[0]:.6g} on mass lies beyond the {self.equations.largest} sizes "
-                f"kept, {-worst:.3g} of it at the end: {self._cure()}"
+                f"from t = {late[0]:.6g} on mass lies beyond the {self.equations.count} sizes "
+                f"kept, {self.shots[-1].beyond:.3g} of it at the end: {self._cure()}"
             )
         negative = min((shot.negative for shot in self.shots), default=0.0)
         if negative < -_NOISE:
@@ -264,7 +336,7 @@ class _Run:
         return found
 
     def _cure(self) -> str:
-        if self.model.kernel.gels:
+        if may_gel(self.model.kernel):
             effect = (
                 "it reacts with them (Flory), as in a simulation"
                 if self.settings.gel == "reacts"
@@ -272,6 +344,25 @@ class _Run:
                 "gel='reacts' follows that"
             )
             return f"after gelation this is the gel, and {effect}"
-        if self.settings.fixed:
-            return "leave out largest, so that the number of sizes grows, or raise it"
-        return f"raise max_size (now {self.limit})"
+        if self.settings.window is not None:
+            return "leave out window, so that the number of sizes grows, or raise it"
+        return f"raise max_window (now {self.integrator.window.limit * self.equations.unit})"
+
+
+def largest_size(model: Model) -> int:
+    """Return the largest size at the start or from a source."""
+    sources = [int(p.table[0][-1]) for p in model.processes if isinstance(p, Source)]
+    return max([model.initial.largest, *sources])
+
+
+def with_error(dataset: xr.Dataset, model: Model, settings: Settings) -> xr.Dataset:
+    """Add the largest relative difference of number density and moments from a looser solution."""
+    looser = replace(settings, tolerance=min(10.0 * settings.tolerance, 0.1))
+    other = Run(model, looser, room=1 if settings.window else 2).dataset()
+    found = np.zeros(dataset.sizes["time"])
+    for name in ("number_density", "moment"):
+        one, two = (x[name].values.reshape(1, len(found), -1)[0] for x in (dataset, other))
+        scale = np.maximum(np.abs(one), np.finfo(float).tiny)
+        found = np.maximum(found, (np.abs(one - two) / scale).max(axis=1))
+    described = {"long_name": "relative difference from a solution of a tenfold tolerance"}
+    return dataset.assign(error=("time", found, described))

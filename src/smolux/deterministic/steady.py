@@ -17,6 +17,7 @@ from ..processes import Aggregation
 from .equations import Equations
 from .integrate import SolverError
 from .operator import OperatorFactory
+from .terms import Totals
 from .window import Window
 
 Float = NDArray[np.float64]
@@ -33,7 +34,7 @@ _FASTER, _SLOWER = 10.0, 0.3
 #: sizes at the start, exponentially distributed
 _MEAN, _FIRST = 8.0, 256
 #: tolerance that decides on the number of sizes
-_WINDOW_TOLERANCE = 1e-6
+_WINDOW_TOLERANCE = 1e-9
 #: an eigenvalue smaller than this, relative to the rate of collisions, is that of the mass
 _ZERO = 1e-6
 
@@ -83,7 +84,7 @@ class Linearisation:
     def __init__(self, equations: Equations, n: Float) -> None:
         self.equations, self.n, self.sizes = equations, n, equations.sizes
         equations.operator.prepare(n)
-        rates, collisions = equations.rates(np.zeros(1), n[None, :])
+        rates, along = equations.rates(np.zeros(1), n[None, :])
         # products are with vectors that do not fall off as the densities do
         equations.operator.prepare(None)
         self.rates = self._closed(rates[0])
@@ -92,7 +93,7 @@ class Linearisation:
         loss, gain = equations.shares(0.0)
         frequency = loss * equations.operator.loss(n[None, :])[0] + equations.lone_losses(0.0)
         #: collisions per time, of a particle and of the mass
-        self.scale = 2.0 * float(collisions.sum()) / float(n.sum())
+        self.scale = 2.0 * float(Totals.of(along[0]).events.sum()) / float(n.sum())
         self.turnover = float((n * frequency) @ self.sizes)
         count = min(_BANDS, len(n))
         self._frequency = frequency
@@ -212,7 +213,9 @@ def steady_state(
         n = n * (mass / float(n @ equations.sizes))
         near = Linearisation(equations, n)
         residual = float(np.abs(near.rates) @ near.sizes) / near.turnover
-        if residual <= tolerance and window.next(n)[0] == len(n):
+        share = window.share(n, equations.beyond(0.0, n))
+        count = window.next(len(n), share, 1.0 / near.scale, 0.0)[0]
+        if residual <= tolerance and count == len(n):
             return SteadyState(model, n, residual, iteration)
         if not np.isfinite(residual):
             break
@@ -222,12 +225,9 @@ def steady_state(
             step *= float(np.clip(before / residual, _SLOWER, _FASTER))
         before = residual
         n = np.maximum(n + near.solve(1.0 / step, near.rates, _SOLVED), 0.0)
-        more = window.next(n)[0] - len(n)
-        if more > 0:
-            n = np.pad(n, (0, more))
+        if count > len(n):
+            n = np.pad(n, (0, count - len(n)))
             equations.resize(len(n))
-        elif len(n) == _LIMIT and largest is None and not window.empty(n):
-            break
     raise SolverError(
         f"no steady state found with up to {len(n)} sizes: is there a process that brings back "
         "small sizes, such as shattering?",

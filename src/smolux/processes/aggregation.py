@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from .base import Float, PairProcess
+from .base import PairProcess
+from .daughters import Merged
 
 
 def _merge(i: int, j: int, sizes: Any, counts: Any) -> int:
@@ -26,8 +27,7 @@ class Aggregation(PairProcess):
     name: ClassVar[str] = "aggregation"
     outcome: ClassVar[Callable[..., Any]] = staticmethod(_merge)
 
-    def rhs(
-        self, t: float, sizes: Float, n: Float, loss: Float, gain: Callable[[], Float]
-    ) -> Float:
-        """See `PairProcess.rhs`."""
-        return gain() - loss
+    @property
+    def daughters(self) -> Merged:
+        """See `PairProcess.daughters`."""
+        return Merged()

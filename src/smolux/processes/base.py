@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..kernels.base import Kernel
 from ..sizefunction import SizeFunction
 from ..timefunction import TimeFunction
+from .daughters import Daughters
 
 Float = NDArray[np.float64]
 
@@ -65,22 +66,9 @@ class PairProcess(Process):
         """What `outcome` takes last."""
         return ()
 
-    def rhs(
-        self, t: float, sizes: Float, n: Float, loss: Float, gain: Callable[[], Float]
-    ) -> Float:
-        """Contribution to ``dn/dt`` in the rate equations.
-
-        Parameters
-        ----------
-        t : float
-            Time.
-        sizes, n : ndarray of shape (M,)
-            Sizes ``1 .. M`` and their densities.
-        loss : ndarray of shape (M,)
-            ``n_k sum_j K(k, j) n_j``.
-        gain : callable
-            Returns ``sum_{i+j=k} K(i, j) n_i n_j / 2`` for ``k = 1 .. M``; computed only if called.
-        """
+    @property
+    def daughters(self) -> Daughters:
+        """What appears on average: `Merged` or `Debris`, of which the rate equations are made."""
         raise NotImplementedError
 
 
@@ -135,12 +123,13 @@ class LoneProcess(Process):
         """
         raise NotImplementedError
 
-    def rates(self, sizes: Float) -> Float:
-        """Rate of a particle of each of the sizes ``1 .. M``."""
+    @property
+    def daughters(self) -> Daughters:
+        """What appears on average: `Nothing`, `Detached` or `Split`."""
         raise NotImplementedError
 
-    def gain(self, sizes: Float, n: Float, lost: Float) -> Float:
-        """Return what appears per time in each size, when of `n` so much vanishes."""
+    def rates(self, sizes: Float) -> Float:
+        """Rate of a particle of each of the given sizes, unless it `splits`."""
         raise NotImplementedError
 
 

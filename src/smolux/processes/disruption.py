@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..sizefunction import SizeFunction
 from ..timefunction import TimeFunction
 from .base import Float, PairProcess
+from .daughters import Debris
 
 #: the largest fragment, unless another one is given, and the largest that may be
 _LARGEST, _MOST = 64, 1 << 16
@@ -123,15 +124,11 @@ class CollisionalFragmentation(PairProcess):
         """See `Process.factor`."""
         return TimeFunction.of(self.rate, "the rate of collisional fragmentation")
 
-    def rhs(
-        self, t: float, sizes: Float, n: Float, loss: Float, gain: Callable[[], Float]
-    ) -> Float:
-        """See `PairProcess.rhs`."""
-        made = fragments(tuple(self.shares.tolist()), len(n)).T @ gain()
-        rate = -self.factor(t) * loss
-        rate[: len(made)] += self.factor(t) * made
-        rate[0] -= rate @ sizes  # pairs that together are beyond the window
-        return rate
+    @property
+    def daughters(self) -> Debris:
+        """See `PairProcess.daughters`."""
+        shares = tuple(self.shares.tolist())
+        return Debris(shares, partial(fragments, shares) if len(shares) > 1 else None)
 
 
 @lru_cache(maxsize=4)

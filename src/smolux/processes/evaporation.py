@@ -11,6 +11,7 @@ import numpy as np
 from ..checks import is_number
 from ..errors import InputError
 from .base import Float, LoneProcess, RatedBySize
+from .daughters import Detached
 
 
 def _evaporate(k: int, part: int, sizes: Any, counts: Any) -> int:
@@ -63,11 +64,10 @@ class Evaporation(RatedBySize, LoneProcess):
         """See `LoneProcess.rates`."""
         return np.where(sizes > 1.0, self.of_size(sizes), 0.0)
 
-    def gain(self, sizes: Float, n: Float, lost: Float) -> Float:
-        """See `LoneProcess.gain`."""
-        made = np.append(lost[1:], 0.0)
-        made[0] += lost[1:].sum()
-        return made
+    @property
+    def daughters(self) -> Detached:
+        """See `LoneProcess.daughters`."""
+        return Detached(1)
 
     @classmethod
     def free_molecular(

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
 from ..callables import spread
 from ..checks import is_number
-from ..content import frozen
 from ..errors import InputError
 from ..kernels import Constant, formula, from_dict, from_function
 from ..kernels.base import Kernel
 from ..kernels.numeric import SAFETY
 from .base import Float, LoneProcess, Varying
+from .daughters import Split
 
-#: entries of the law that are handled at once; sizes for which all are kept
-_BLOCK, _KEPT = 1 << 22, 1 << 12
 #: splits of a bin that are tried
 _TRIED = 32
 
@@ -120,30 +118,10 @@ class Fragmentation(Varying, LoneProcess):
         bound = np.where(np.isfinite(bound), bound, SAFETY * found.max(axis=(0, 1)))
         return bound, widths, found.mean(axis=1).min(axis=0)
 
-    def rates(self, sizes: Float) -> Float:
-        """See `LoneProcess.rates`."""
-        if isinstance(self.pairs, Constant):
-            return 0.5 * self.pairs.scale * (sizes - 1.0)
-        m = len(sizes)
-        if m <= _KEPT:
-            return np.asarray(0.5 * _matrix(frozen(self.pairs), m).sum(axis=0))
-        rows = max(1, _BLOCK // m)
-        return 0.5 * sum(
-            (_rows(self.pairs, a, min(a + rows, m), m).sum(axis=0) for a in range(0, m, rows)),
-            np.zeros(m),
-        )
-
-    def gain(self, sizes: Float, n: Float, lost: Float) -> Float:
-        """See `LoneProcess.gain`: ``sum_j F(k, j) n_{k+j}``."""
-        if isinstance(self.pairs, Constant):
-            above = np.cumsum(n[::-1])[::-1]
-            return self.pairs.scale * np.append(above[1:], 0.0)
-        m = len(n)
-        if m <= _KEPT:
-            return np.asarray(_matrix(frozen(self.pairs), m) @ n)
-        rows = max(1, _BLOCK // m)
-        blocks = [_rows(self.pairs, a, min(a + rows, m), m) @ n for a in range(0, m, rows)]
-        return np.concatenate(blocks)
+    @property
+    def daughters(self) -> Split:
+        """See `LoneProcess.daughters`."""
+        return Split(self.pairs)
 
 
 def _bins(low: Float, high: Float) -> tuple[tuple[Float, Float, Float, Float], Float]:
@@ -165,15 +143,3 @@ def _bins(low: Float, high: Float) -> tuple[tuple[Float, Float, Float, Float], F
     d = np.hstack([high - ends, high - most, high - most + deep])
     widths = np.hstack([top - ends + 1.0, np.ones(half.shape), np.maximum(deep - ends + 1.0, 0.0)])
     return (np.minimum(a, b), b, np.minimum(c, d), d), widths
-
-
-def _rows(law: Kernel, first: int, last: int, largest: int) -> Float:
-    """Return ``F(k, l - k)`` for the sizes k of some rows and all sizes l, 0 for l up to k."""
-    k = np.arange(first + 1.0, last + 1.0)[:, None]
-    other = np.arange(1.0, largest + 1.0)[None, :] - k
-    return np.where(other > 0.0, law(k, np.maximum(other, 1.0)), 0.0)
-
-
-@lru_cache(maxsize=2)
-def _matrix(law: Kernel, largest: int) -> Float:
-    return _rows(law, 0, largest, largest)

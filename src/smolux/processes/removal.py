@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from ..checks import is_number
 from ..errors import InputError
 from .base import Float, LoneProcess, RatedBySize
+from .daughters import Nothing
 
 
 def _vanish(k: int, part: int, sizes: Any, counts: Any) -> int:
@@ -71,6 +70,7 @@ class Removal(RatedBySize, LoneProcess):
         """See `LoneProcess.rates`."""
         return self.of_size(sizes)
 
-    def gain(self, sizes: Float, n: Float, lost: Float) -> Float:
-        """See `LoneProcess.gain`."""
-        return np.zeros(len(sizes))
+    @property
+    def daughters(self) -> Nothing:
+        """See `LoneProcess.daughters`."""
+        return Nothing()

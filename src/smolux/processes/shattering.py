@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..timefunction import TimeFunction
-from .base import Float, PairProcess
+from .base import PairProcess
+from .daughters import Debris
 
 
 def _shatter(i: int, j: int, sizes: Any, counts: Any) -> int:
@@ -46,10 +47,7 @@ class Shattering(PairProcess):
         """λ as a function of time."""
         return TimeFunction.of(self.rate, "the shattering rate")
 
-    def rhs(
-        self, t: float, sizes: Float, n: Float, loss: Float, gain: Callable[[], Float]
-    ) -> Float:
-        """See `PairProcess.rhs`."""
-        rate = -self.factor(t) * loss
-        rate[0] -= rate @ sizes
-        return rate
+    @property
+    def daughters(self) -> Debris:
+        """See `PairProcess.daughters`."""
+        return Debris((1.0,))

@@ -65,11 +65,3 @@ class Source(Varying, Process):
         pairs = sorted((int(size), float(rate)) for size, rate in given.items())
         sizes, rates = zip(*pairs, strict=True)
         return np.array(sizes, np.int64), np.array(rates)
-
-    def densities(self, largest: int) -> Float:
-        """Return the rates of the sizes ``1 .. largest``."""
-        found = np.zeros(largest)
-        for size, rate in zip(*self.table, strict=True):
-            if size <= largest:
-                found[size - 1] += rate
-        return found
