@@ -78,7 +78,7 @@ class Tilts:
         self._powers = sizes ** np.arange(4.0)[:, None]
         self._sums = _log(np.add.reduceat(self._powers * sizes**power, self._starts, axis=1))
         cuts = np.searchsorted(self._starts, np.multiply(_CUTS, m))
-        self._cuts = [int(c) for c in np.unique(cuts) if _LEAST <= self._starts[c]]
+        self._cuts = [int(c) for c in np.unique(cuts) if self._starts[c] >= _LEAST]
 
     def __call__(self, n: Float, lost: Float, allowed: float) -> tuple[list[Tilt], float]:
         """Return one tilt, or two if rounding matters with one and parting the sizes helps.
