@@ -45,11 +45,24 @@ class Lognormal(Initial):
 
     def cumulative(self, sizes: Float) -> Float:
         """See `Initial.cumulative`; what lies below 1/2 counts as size 1."""
-        sizes = np.floor(np.asarray(sizes, float))
-        z = np.log(np.maximum(sizes, 1) / self.median + 0.5 / self.median) / np.log(self.sigma)
         from scipy import special
 
-        return np.where(sizes >= 1, special.ndtr(z), 0.0)
+        sizes = np.floor(np.asarray(sizes, float))
+        return np.where(sizes >= 1, special.ndtr(self._deviations(sizes)), 0.0)
+
+    def _deviations(self, sizes: Float) -> Float:
+        """How many standard deviations the upper edges of sizes lie above the median."""
+        return np.log(np.maximum(sizes, 1) / self.median + 0.5 / self.median) / np.log(self.sigma)
+
+    def densities(self, largest: int) -> Float:
+        """See `Initial.densities`; exact far into both tails."""
+        from scipy import special
+
+        z = self._deviations(np.arange(1.0, largest + 1.0))
+        below, above = special.ndtr(z), special.ndtr(-z)
+        # what lies in the upper half is a difference of what lies above
+        shares = np.where(z[1:] < 0.0, np.diff(below), -np.diff(above))
+        return self.density * np.concatenate([below[:1], shares])
 
     def quantile(self, share: Float) -> Int:
         """See `Initial.quantile`."""
