@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -65,16 +66,16 @@ def cell(start, kernel, *processes, varying="none"):
 
 @pytest.mark.parametrize("kernel", KERNELS, ids=lambda k: k.name)
 def test_reference_sums_over_all_pairs(kernel, monkeypatch):
-    n = np.random.default_rng(14).random(30)
-    loss, gain = reference.slow_sums(kernel.law, n)
     k = np.arange(1.0, 31.0)
+    n = np.random.default_rng(14).random(30) * np.exp(-k)
+    loss, gain = reference.slow_sums(kernel.law, n)
     given = kernel.kernel(k[:, None], k[None, :])
     np.testing.assert_allclose(kernel.law.rate(k[:, None], k[None, :]), given, rtol=1e-14)
     for matrix in (1500, 0):  # plain sums, transforms
         monkeypatch.setattr(reference, "_MATRIX", matrix)
         sums = reference.Sums(kernel.law, 30)
         np.testing.assert_allclose(sums.loss(n), loss, rtol=1e-13)
-        np.testing.assert_allclose(sums.gain(n), gain, rtol=1e-11, atol=1e-11)
+        np.testing.assert_allclose(sums.gain(n), gain, rtol=1e-11, atol=1e-22)
 
 
 def test_reference_fragments():
@@ -111,7 +112,7 @@ def test_reference_against_closed_forms(start, process, coefficients):
 
 @pytest.mark.parametrize("varying", ["ramp", "pulse", "box", "periodic"])
 def test_reference_against_closed_forms_of_time(varying):
-    case = cell("20", "constant", "dilution", varying=varying)
+    case = cell("2", "constant", "dilution", varying=varying)
     problem, end = case.problem, case.times[-1]
     exact = reference.solve(problem, case.times)
     factor = problem.lone[0].factor
@@ -121,11 +122,12 @@ def test_reference_against_closed_forms_of_time(varying):
 
 def test_reference_with_another_integrator():
     case = cell("2", "Brownian", "shattering", "evaporation", varying="ramp")
-    a = reference.solve(case.problem, case.times)
-    for method in ("LSODA", "Radau"):
-        b = reference.solve(case.problem, case.times, method=method, rtol=1e-10)
-        np.testing.assert_allclose(b.moment, a.moment, rtol=1e-9)
-        np.testing.assert_allclose(b.n, a.n, atol=1e-9)
+    problem = replace(case.problem, cut=12)
+    a = reference.solve(problem, case.times)
+    b = reference.solve(problem, case.times, method="LSODA")
+    np.testing.assert_allclose(b.moment, a.moment, rtol=1e-9)
+    np.testing.assert_allclose(b.n, a.n, atol=1e-9)
+    np.testing.assert_allclose(b.mass_out, a.mass_out, atol=1e-9)
 
 
 # Closed forms from any start

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy import integrate
 
 from .reference import Float, OfTime
+
+#: of Gauss's rule between two breaks
+_NODES = 40
 
 
 def constant_number(density: float, t: float) -> float:
@@ -66,11 +68,16 @@ def riccati(density: float, a: float, b: float, c: float, t: float) -> float:
 def diluted_number(density: float, rate: OfTime, t: float, breaks: Sequence[float] = ()) -> float:
     """Return M0 for K = 1 with removal of all sizes at ``rate(t)``."""
     inside = sorted({0.0, t, *(b for b in breaks if 0.0 < b < t)})
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     left, grown = 1.0, 0.0
-    for a, b in pairwise(inside):
-        nodes, weights = np.polynomial.legendre.leggauss(60)
+
+    def integral(a: float, b: float) -> float:
         x = 0.5 * (b - a) * (nodes + 1.0) + a
-        gone = [integrate.quad(rate, a, float(s), epsabs=1e-15, epsrel=1e-13)[0] for s in x]
-        grown += left * 0.5 * (b - a) * float(weights @ np.exp(-np.array(gone)))
-        left *= math.exp(-integrate.quad(rate, a, b, epsabs=1e-15, epsrel=1e-13)[0])
+        return 0.5 * (b - a) * float(weights @ [rate(float(s)) for s in x])
+
+    for a, b in pairwise(inside):
+        x = 0.5 * (b - a) * (nodes + 1.0) + a
+        gone = np.array([integral(a, float(s)) for s in x])
+        grown += left * 0.5 * (b - a) * float(weights @ np.exp(-gone))
+        left *= math.exp(-integral(a, b))
     return density * left / (1.0 + 0.5 * density * grown)
