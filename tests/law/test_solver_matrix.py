@@ -31,7 +31,7 @@ AGGREGATION = P.Aggregation()
 #: what a solution at the default tolerance of 1e-8 may be off
 CLOSE = 1e-7
 #: seconds of processor time after which a solution is taken never to end
-PATIENCE = 4.0
+PATIENCE = 60.0
 BOTH = pytest.mark.parametrize("method", ["direct", "low-rank"])
 
 
