@@ -20,7 +20,7 @@ from .closed import additive_number, constant_densities, constant_number, second
 from .judge import TOLERANCE, judge
 
 #: processor seconds of one solution
-_LIMIT = 60.0
+_LIMIT = 3.0
 #: an error of so many tolerances is still what was asked for
 _ALLOWED = 10.0
 #: the direct sum on a given window is tried up to so many sizes
@@ -95,20 +95,24 @@ def _crossed(
     return Table(caption, [corner, *names[1]], body)
 
 
+@styled
 def _figure(rows: Sequence[dict[str, Any]]) -> Figure:
-    ways = list(dict.fromkeys(way for row in rows for way in row["runs"]))
-    with styled():
-        figure, axes = new_figure()
-        for way, color in zip(ways, PALETTE, strict=False):
-            errors = sorted(_error(row["runs"][way]["worst"]) for row in rows if way in row["runs"])
-            share = (np.arange(len(errors)) + 1.0) / len(errors)
-            axes.step(np.maximum(errors, 1e-14), share, where="post", color=color, label=way)
-        axes.axvline(TOLERANCE, color="0.6", linewidth=0.8)
-        use_log(axes, "x")
-        axes.set_xlabel("largest relative error")
-        axes.set_ylabel("share of the cells")
-        axes.legend()
+    figure = new_figure("single", 0.8)
+    ax = figure.subplots()
+    for way, color in zip(_named(rows), PALETTE, strict=False):
+        errors = sorted(_error(row["runs"][way]["worst"]) for row in rows if way in row["runs"])
+        share = (np.arange(len(errors)) + 1.0) / len(errors)
+        ax.step(np.clip(errors, 1e-14, 10.0), share, where="post", color=color, label=way)
+    ax.axvline(TOLERANCE, color="0.6", linewidth=0.8)
+    use_log(ax, "x")
+    ax.set_xlabel("largest relative error")
+    ax.set_ylabel("share of the cells")
+    ax.legend()
     return figure
+
+
+def _named(rows: Sequence[dict[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(way for row in rows for way in row["runs"]))
 
 
 def _checks(rows: Sequence[dict[str, Any]]) -> list[Check]:
@@ -117,7 +121,7 @@ def _checks(rows: Sequence[dict[str, Any]]) -> list[Check]:
         at_most("error of the reference: edge, tolerance",
                 max(_error(r["reference"]) for r in rows), 2e-9, "(a fifth of the tolerance)"),
     ]  # fmt: skip
-    for way in dict.fromkeys(way for row in rows for way in row["runs"]):
+    for way in _named(rows):
         runs = [row["runs"][way] for row in rows if way in row["runs"]]
         good = sum(_error(run["worst"]) <= allowed for run in runs)
         checks.append(
