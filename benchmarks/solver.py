@@ -15,7 +15,7 @@ import numpy as np
 from scipy import fft
 
 import smolux as sx
-from benchmarks.common import model, table, write_section
+from benchmarks.common import interleaved, model, table, write_section
 from smolux.deterministic import hopf_threshold
 from smolux.deterministic.operator import Direct, LowRank, OperatorFactory
 
@@ -88,6 +88,77 @@ def runs(tolerances: Sequence[float]) -> list[str]:
     return table(header, rows)
 
 
+def _with(kernel: Any, *processes: Any, initial: Any = None) -> sx.Model:
+    every = [sx.processes.Aggregation(), *processes]
+    return sx.Model(kernel, every, initial=initial or sx.initial.monodisperse())
+
+
+_K1, _P, _I = sx.kernels.Constant(), sx.processes, sx.initial
+#: what has always worked and must not become slower: title, model, end, options
+WORKING: tuple[tuple[str, sx.Model, float, dict[str, Any]], ...] = (
+    ("constant, t = 8", _with(_K1), 8.0, {}),
+    ("constant, t = 1000", _with(_K1), 1000.0, {}),
+    ("additive, t = 1", _with(sx.kernels.Additive()), 1.0, {}),
+    ("multiplicative, t = 0.8", _with(sx.kernels.Multiplicative()), 0.8, {}),
+    ("Brownian, t = 100", _with(sx.kernels.Brownian()), 100.0, {}),
+    ("ballistic, t = 10", _with(sx.kernels.Ballistic()), 10.0, {}),
+    ("ballistic, exponential of 10, t = 1",
+     _with(sx.kernels.Ballistic(), initial=_I.exponential(10.0)), 1.0, {}),
+    ("constant, lognormal 100, 1.05, t = 0.5", _with(_K1, initial=_I.lognormal(100, 1.05)), 0.5,
+     {}),
+    ("ballistic, λ = 0.01, 5000 sizes, t = 10, 1e-9",
+     _with(sx.kernels.Ballistic(), _P.Shattering(0.01)), 10.0,
+     {"largest": 5000, "tolerance": 1e-9}),
+    ("ballistic, λ = 0.01, t = 100", _with(sx.kernels.Ballistic(), _P.Shattering(0.01)), 100.0, {}),
+    ("oscillations, a = 0.95, λ = 0.01, t = 60",
+     _with(sx.kernels.GeneralizedBrownian(0.95), _P.Shattering(0.01)), 60.0, {}),
+    ("a = 0.9, λ falls in time, t = 15",
+     _with(sx.kernels.GeneralizedBrownian(0.9), _P.Shattering("0.01*(1 - t/400)"),
+           initial=_I.from_sizes(dict.fromkeys(range(1, 11), 0.1))), 15.0, {}),
+    ("sedimentation, direct, exponential of 3, t = 0.05",
+     _with(sx.kernels.Sedimentation(), initial=_I.exponential(3.0)), 0.05, {"method": "direct"}),
+    ("formula without given factors, t = 3", _with(sx.kernels.formula("log(1 + i + j + i*j)")),
+     3.0, {}),
+    ("constant, source of monomers, t = 30", _with(_K1, _P.Source(1.0), initial=_I.empty()), 30.0,
+     {}),
+    ("Brownian, evaporation, t = 20", _with(sx.kernels.Brownian(), _P.Evaporation(0.3)), 20.0, {}),
+    ("constant, scission, t = 20", _with(_K1, _P.Fragmentation(0.1)), 20.0, {}),
+    ("Brownian, source, deposition, t = 20",
+     _with(sx.kernels.Brownian(), _P.Source(1.0), _P.Removal("0.1*k**(1/3)")), 20.0, {}),
+    ("constant, debris, t = 10", _with(_K1, _P.CollisionalFragmentation(0.1, [3, 2, 1])), 10.0,
+     {}),
+)  # fmt: skip
+
+
+def _yardstick() -> float:
+    """Processor seconds of fixed work of the kind that a solution is made of."""
+    x = np.random.default_rng(0).random((4, 8192))
+    a = np.random.default_rng(1).random((500, 500))
+    start = time.process_time()
+    for _ in range(150):
+        y = fft.irfft(fft.rfft(x, 16384) ** 2, 16384)
+    for _ in range(200):
+        a @ a[0]
+    for _ in range(2000):
+        np.cumsum(y[0, :2000] * x[0, :2000]).sum()
+    return time.process_time() - start
+
+
+def against_yardstick(repeats: int = 5) -> list[str]:
+    """Time what has always worked in units of the yardstick, least of both."""
+    rows = []
+    for title, physics, end, options in WORKING:
+
+        def solution(physics: Any = physics, end: float = end, options: Any = options) -> float:
+            start = time.process_time()
+            sx.solve(physics, [end], **options)
+            return time.process_time() - start
+
+        yard, seconds = interleaved([_yardstick, solution], repeats).min(axis=0)
+        rows.append([title, f"{seconds:.2f}", f"{seconds / yard:.2f}"])
+    return table(["case", "s", "yardsticks"], rows)
+
+
 def evaluation(sizes: int) -> list[list[str]]:
     """Time one evaluation of loss and gain, by each way of summing."""
     k = np.arange(1.0, sizes + 1.0)
@@ -138,6 +209,11 @@ def main() -> None:
             "The reference values are good to 1e-10, that of the oscillating case to 4e-9.",
             "",
             *runs((1e-6, 1e-8, 1e-10)),
+            "",
+            "What has always worked, in seconds and in units of fixed work of transforms and sums "
+            "within one run, by which two versions can be compared; the least of five:",
+            "",
+            *against_yardstick(),
             "",
             "One evaluation of loss and gain, in ms, four densities at once. The transforms alone, "
             "R + 1 of them of twice the length, are the limit of the second column:",

@@ -1,0 +1,461 @@
+"""The solver from any start, with anything that happens, against what it does not share.
+
+Closed forms first, then an independent reference (`verification.solver.reference`), which is itself
+held to closed forms and to another integrator. The whole matrix is in `verification/solver`.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from verification.solver import closed, judge, reference
+from verification.solver.axes import KERNELS, PROCESSES, STARTS, VARYING
+from verification.solver.cells import Cell
+
+import smolux as sx
+from smolux import analysis
+from smolux.errors import SmoluxWarning
+
+P, I = sx.processes, sx.initial  # noqa: E741
+K1 = sx.kernels.Constant()
+AGGREGATION = P.Aggregation()
+#: what a solution at the default tolerance of 1e-8 may be off
+CLOSE = 1e-7
+#: seconds of processor time after which a solution is taken never to end
+PATIENCE = 60.0
+BOTH = pytest.mark.parametrize("method", ["direct", "low-rank"])
+
+
+def solved(model, times, **options):
+    """Solve within a limit of time and without a warning, of NumPy's neither."""
+    with judge.limited(PATIENCE), warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        return sx.solve(model, times, **options)
+
+
+def number(ds):
+    return ds["number_density"].values[0]
+
+
+def moment(ds, order):
+    return ds["moment"].sel(order=order).values[0]
+
+
+def with_(*processes, kernel=K1, initial=None):
+    initial = I.monodisperse() if initial is None else initial
+    return sx.Model(kernel, [AGGREGATION, *processes], initial=initial)
+
+
+def cell(start, kernel, *processes, varying="none"):
+    named = [{x.name: x for x in axis} for axis in (STARTS, KERNELS, PROCESSES, VARYING)]
+    chosen = tuple(named[2][p] for p in processes)
+    return Cell(named[0][start], named[1][kernel], chosen, named[3][varying])
+
+
+# The reference itself
+
+
+@pytest.mark.parametrize("kernel", KERNELS, ids=lambda k: k.name)
+def test_reference_sums_over_all_pairs(kernel, monkeypatch):
+    k = np.arange(1.0, 31.0)
+    n = np.random.default_rng(14).random(30) * np.exp(-k)
+    loss, gain = reference.slow_sums(kernel.law, n)
+    given = kernel.kernel(k[:, None], k[None, :])
+    np.testing.assert_allclose(kernel.law.rate(k[:, None], k[None, :]), given, rtol=1e-14)
+    for matrix in (1500, 0):  # plain sums, transforms
+        monkeypatch.setattr(reference, "_MATRIX", matrix)
+        sums = reference.Sums(kernel.law, 30)
+        np.testing.assert_allclose(sums.loss(n), loss, rtol=1e-13)
+        np.testing.assert_allclose(sums.gain(n), gain, rtol=1e-11, atol=1e-22)
+
+
+def test_reference_fragments():
+    # of a mass of 2 with shares 3 and 2: a dimer with 2/5, else two monomers; of 3 by hand
+    found = reference.fragments((3, 2), 3)
+    np.testing.assert_allclose(found[:2], [[1, 0], [2 * 3 / 5, 2 / 5]], rtol=1e-15)
+    np.testing.assert_allclose(found[2], [3 / 5 * (1 + 6 / 5) + 2 / 5, 3 / 5 * 2 / 5 + 2 / 5])
+    masses = np.arange(1, 41)
+    np.testing.assert_allclose(reference.fragments((3, 2, 1), 40) @ [1, 2, 3], masses, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("start", "process", "coefficients"),
+    [
+        ("20", "shattering", lambda s, mass: (0.0, 0.3 * mass, 0.8)),
+        ("monomers", "scission", lambda s, mass: (0.4 * mass / s.time, -0.4 / s.time, 0.5)),
+        ("3, 7 and 50", "dilution", lambda s, mass: (0.0, -0.5 / s.time, 0.5)),
+        ("2", "source", lambda s, mass: (0.5 / s.time, 0.0, 0.5)),
+        ("empty", "source", lambda s, mass: (0.5 / s.time, 0.0, 0.5)),
+    ],
+)
+def test_reference_against_closed_forms(start, process, coefficients):
+    case = cell(start, "constant", process)
+    exact = reference.solve(case.problem, case.times)
+    n = case.start.densities(exact.window)
+    mass = float(n @ np.arange(1.0, len(n) + 1.0))
+    for t, found in zip(case.times, exact.moment[:, 0], strict=True):
+        right = closed.riccati(float(n.sum()), *coefficients(case.scale, mass), t)
+        assert found == pytest.approx(right, rel=1e-10)
+    np.testing.assert_allclose(
+        exact.moment[:, 1], mass + exact.mass_in - exact.mass_out, rtol=1e-10
+    )
+
+
+@pytest.mark.parametrize("varying", ["ramp", "pulse", "box", "periodic"])
+def test_reference_against_closed_forms_of_time(varying):
+    case = cell("2", "constant", "dilution", varying=varying)
+    problem, end = case.problem, case.times[-1]
+    exact = reference.solve(problem, case.times)
+    factor = problem.lone[0].factor
+    right = closed.diluted_number(1.0, lambda t: 0.5 / end * factor(t), end, problem.breaks)
+    assert exact.moment[-1, 0] == pytest.approx(right, rel=1e-9)
+
+
+def test_reference_with_another_integrator():
+    case = cell("2", "Brownian", "shattering", "evaporation", varying="ramp")
+    problem = replace(case.problem, cut=12)
+    a = reference.solve(problem, case.times)
+    b = reference.solve(problem, case.times, method="LSODA")
+    np.testing.assert_allclose(b.moment, a.moment, rtol=1e-9)
+    np.testing.assert_allclose(b.n, a.n, atol=1e-9)
+    np.testing.assert_allclose(b.mass_out, a.mass_out, atol=1e-9)
+
+
+# Closed forms from any start
+
+
+@BOTH
+@pytest.mark.parametrize("start", STARTS[:-1], ids=lambda s: s.name)
+def test_constant_kernel(start, method):
+    if method == "direct" and start.largest > 300:
+        pytest.skip("larger than a direct sum should be")
+    times = [0.5, 1.5]
+    ds = solved(sx.Model(K1, initial=start.initial), times, method=method)
+    n = start.densities(start.largest)
+    k = np.arange(1.0, len(n) + 1.0)
+    mass, second = float(n @ k), float(n @ k**2)
+    right = [closed.constant_number(start.density, t) for t in times]
+    np.testing.assert_allclose(number(ds), right, rtol=CLOSE)
+    np.testing.assert_allclose(moment(ds, 1), mass, rtol=CLOSE)
+    right = [closed.second_moment("constant", mass, second, t) for t in times]
+    np.testing.assert_allclose(moment(ds, 2), right, rtol=CLOSE)
+    densities = closed.constant_densities(start.densities(1024), times[-1])
+    np.testing.assert_allclose(ds["n"].values[0, -1], densities, atol=CLOSE)
+
+
+@BOTH
+@pytest.mark.parametrize("start", STARTS[:-1], ids=lambda s: s.name)
+def test_additive_kernel(start, method):
+    if method == "direct" and start.largest > 300:
+        pytest.skip("larger than a direct sum should be")
+    n = start.densities(start.largest)
+    k = np.arange(1.0, len(n) + 1.0)
+    mass, second = float(n @ k), float(n @ k**2)
+    times = [0.1 / mass, 0.3 / mass]
+    ds = solved(sx.Model(sx.kernels.Additive(), initial=start.initial), times, method=method)
+    right = [closed.additive_number(start.density, mass, t) for t in times]
+    np.testing.assert_allclose(number(ds), right, rtol=CLOSE)
+    right = [closed.second_moment("additive", mass, second, t) for t in times]
+    np.testing.assert_allclose(moment(ds, 2), right, rtol=CLOSE)
+
+
+@BOTH
+@pytest.mark.parametrize("size", [22, 23, 24, 33, 50])
+def test_brownian_kernel_knows_no_unit(size, method):
+    # of degree 0: only the density decides; spec R2
+    model = sx.Model(sx.kernels.Brownian(), initial=I.monodisperse(size=size))
+    ds = solved(model, [1, 10], method=method)
+    np.testing.assert_allclose(number(ds), [0.3294563200617, 0.04534585261516], rtol=CLOSE)
+
+
+@pytest.mark.parametrize(
+    "initial",
+    [
+        I.monodisperse(size=100),
+        I.monodisperse(size=1000),
+        I.from_sizes({1: 0.5, 100: 0.5}),
+        I.from_sizes(dict.fromkeys(range(95, 106), 1 / 11)),
+        I.lognormal(1000, 1.01),
+    ],
+    ids=["100", "1000", "1 and 100", "95 to 105", "lognormal 1000, 1.01"],
+)
+def test_large_starts_for_a_long_time(initial):
+    ds = solved(sx.Model(K1, initial=initial), [1, 5, 10])
+    np.testing.assert_allclose(number(ds), [2 / 3, 2 / 7, 1 / 6], rtol=CLOSE)
+
+
+@pytest.mark.parametrize("size", [32, 60, 100, 300, 1000])
+def test_shattering_of_large_particles(size):
+    # d/dt N = λ M1 N - (1/2 + λ) N^2, whatever the sizes
+    ds = solved(with_(P.Shattering(0.1), initial=I.monodisperse(size=size)), [0.5 / size, 1.0])
+    right = [closed.riccati(1.0, 0.0, 0.1 * size, 0.6, t) for t in ds["time"].values]
+    np.testing.assert_allclose(number(ds), right, rtol=CLOSE)
+    np.testing.assert_allclose(moment(ds, 1), size, rtol=CLOSE)
+
+
+def test_breakage_and_removal_of_large_particles():
+    start = I.monodisperse(size=100)
+    ds = solved(with_(P.Fragmentation(0.02), initial=start), [1.0, 3.0])
+    right = [closed.riccati(1.0, 1.0, -0.01, 0.5, t) for t in (1.0, 3.0)]
+    np.testing.assert_allclose(number(ds), right, rtol=CLOSE)
+    ds = solved(with_(P.Removal(0.2), initial=start), [1.0, 3.0])
+    right = [closed.riccati(1.0, 0.0, -0.2, 0.5, t) for t in (1.0, 3.0)]
+    np.testing.assert_allclose(number(ds), right, rtol=CLOSE)
+    np.testing.assert_allclose(moment(ds, 1), 100 * np.exp([-0.2, -0.6]), rtol=CLOSE)
+
+
+@pytest.mark.filterwarnings("ignore:M1 of the lognormal law:smolux.errors.SmoluxWarning")
+@pytest.mark.parametrize(("median", "sigma"), [(20, 2), (1, 2.5), (1, 3), (2, 2.5), (15, 2)])
+def test_wide_lognormals(median, sigma):
+    ds = solved(sx.Model(K1, initial=I.lognormal(median, sigma)), [1.0], method="low-rank")
+    assert number(ds)[0] == pytest.approx(2 / 3, rel=CLOSE)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "t"), [({32: 1.0}, 2.9), ({1: 1.0, 60: 1e-3}, 3.0), ({2: 1.0, 301: 1e-6}, 3.0)]
+)
+def test_gaps_between_sizes(sizes, t):
+    ds = solved(sx.Model(K1, initial=I.from_sizes(sizes)), [t], method="low-rank")
+    density = sum(sizes.values())
+    assert number(ds)[0] == pytest.approx(closed.constant_number(density, t), rel=CLOSE)
+    mass, second = (sum(s**p * d for s, d in sizes.items()) for p in (1, 2))
+    assert moment(ds, 2)[0] == pytest.approx(second + mass**2 * t, rel=CLOSE)
+
+
+# Sources and removal
+
+
+@pytest.mark.parametrize(
+    ("rates", "initial", "t"),
+    [
+        ({1: 1.0, 5000: 1e-3}, I.empty(), 2.0),
+        ({100: 1.0}, I.monodisperse(), 2.0),
+        ({40: 1.0}, I.empty(), 4.0),
+        ({64: 1.0}, I.empty(), 4.0),
+        ({65: 0.5}, I.monodisperse(size=3), 4.0),
+        ({100_000: 0.1}, I.monodisperse(), 2.0),
+    ],
+)
+def test_sources_of_any_size(rates, initial, t):
+    ds = solved(with_(P.Source(rates), initial=initial), [0.5 * t, t])
+    flux, mass = sum(rates.values()), sum(s * r for s, r in rates.items())
+    first = initial.total * initial.largest
+    times = np.array([0.5 * t, t])
+    np.testing.assert_allclose(moment(ds, 1), first + mass * times, rtol=CLOSE)
+    np.testing.assert_allclose(ds["mass_in"].values[0], mass * times, rtol=CLOSE)
+    np.testing.assert_allclose(
+        ds["events"].sel(process="source").values[0], flux * times, rtol=CLOSE
+    )
+    right = [closed.riccati(initial.total, flux, 0.0, 0.5, s) for s in times]
+    np.testing.assert_allclose(number(ds), right, rtol=CLOSE)
+
+
+@pytest.mark.parametrize(
+    ("kernel", "above", "printed"),
+    [("constant", 1, 0.3333), ("constant", 2, 0.4176), ("constant", 3, 0.4572)]
+    + [("Brownian", above, None) for above in (1, 3, 7)],
+)
+def test_removal_above_any_size(kernel, above, printed):
+    chosen = next(k for k in KERNELS if k.name == kernel)
+    start = STARTS[0]
+    problem = reference.Problem(
+        chosen.law, [reference.Pairs("aggregation")], [], [], start.densities, above, cut=above
+    )
+    exact = reference.solve(problem, [0.5, 2.0])
+    if printed:
+        assert exact.moment[-1, 0] == pytest.approx(printed, abs=5e-5)
+    ds = solved(with_(P.Removal(above=above), kernel=chosen.kernel), [0.5, 2.0])
+    np.testing.assert_allclose(number(ds), exact.moment[:, 0], rtol=CLOSE)
+    np.testing.assert_allclose(ds["mass_out"].values[0], exact.mass_out, rtol=CLOSE)
+    np.testing.assert_allclose(moment(ds, 1) + ds["mass_out"].values[0], 1.0, rtol=CLOSE)
+
+
+def test_everything_leaves():
+    ds = solved(with_(P.Removal(1.0)), [1.0, 20.0, 800.0])
+    right = [closed.riccati(1.0, 0.0, -1.0, 0.5, t) for t in (1.0, 20.0)]
+    np.testing.assert_allclose(number(ds)[:2], right, rtol=CLOSE)
+    assert 0.0 <= number(ds)[2] < 1e-300
+    np.testing.assert_allclose(ds["mass_out"].values[0], -np.expm1([-1.0, -20.0, -800.0]))
+
+
+# What varies in time
+
+SPIKE = "1000*exp(-((t-50)/0.01)**2)"
+#: its integral
+AREA = 10 * math.sqrt(math.pi)
+SLOW = sx.kernels.Constant(1e-6)
+
+
+def test_source_with_a_narrow_pulse():
+    ds = solved(with_(P.Source(1, varying=SPIKE)), [100])
+    assert ds["mass_in"].values[0, 0] == pytest.approx(AREA, rel=CLOSE)
+    assert moment(ds, 1)[0] == pytest.approx(1 + AREA, rel=CLOSE)
+    # before, the pulse itself, after: the pulse lasts 0.02, over which next to nothing meets
+    after = 2 / (2 / (2 / 52 + AREA) + 50)
+    assert number(ds)[0] == pytest.approx(after, rel=2e-3)
+
+
+def test_periodic_source_in_a_slow_system():
+    ds = solved(with_(P.Source(1, varying="max(0, sin(2*pi*t))"), kernel=SLOW), [100])
+    assert ds["mass_in"].values[0, 0] == pytest.approx(100 / math.pi, rel=CLOSE)
+
+
+def box(t):
+    return 1.0 if 42 <= t < 78 else 0.0
+
+
+@pytest.mark.parametrize("stated", [False, True])
+def test_box_in_a_slow_system(stated):
+    varying = sx.law(box, breakpoints=[42, 78]) if stated else box
+    ds = solved(with_(P.Source(1, varying=varying), kernel=SLOW), [100])
+    assert ds["mass_in"].values[0, 0] == pytest.approx(36, rel=CLOSE)
+
+
+def test_pulse_by_a_formula_with_corners():
+    # a triangle of height 1 and width 2 about 50
+    ds = solved(with_(P.Source(1, varying="max(0, 1 - abs(t - 50))"), kernel=SLOW), [30, 100])
+    np.testing.assert_allclose(ds["mass_in"].values[0], [0.0, 1.0], rtol=CLOSE)
+
+
+@pytest.mark.parametrize("process", ["removal", "shattering", "fragmentation"])
+def test_pulses_of_other_processes(process):
+    # the pulse is over before particles meet: what it does is known alone
+    pulse = f"0.05*{SPIKE}"
+    strength = 0.05 * AREA
+    slow = sx.kernels.Constant(1e-10)
+    if process == "removal":
+        ds = solved(with_(P.Removal(1, varying=pulse), kernel=slow), [100])
+        right = math.exp(-strength)
+    elif process == "fragmentation":
+        start = I.monodisperse(size=2)
+        ds = solved(with_(P.Fragmentation(2.0, varying=pulse), kernel=slow, initial=start), [100])
+        right = 2 - math.exp(-strength)
+    else:
+        # N' = λ(t) K (M1 - N) N, with 100-mers and λ of 1e6
+        kernel = sx.kernels.Constant(1e-8)
+        start = I.monodisperse(size=100)
+        ds = solved(with_(P.Shattering(f"1e6*{pulse}"), kernel=kernel, initial=start), [100])
+        grown = math.exp(100 * 0.01 * strength)
+        right = 100 * grown / (99 + grown)
+    assert number(ds)[0] == pytest.approx(right, rel=2e-6 if process == "shattering" else CLOSE)
+
+
+@pytest.mark.parametrize(
+    ("varying", "share"), [("t", 0.5), ("t**3", 0.25), ("max(0, t - 0.4)", 0.18), (box, None)]
+)
+def test_source_that_begins_with_nothing(varying, share):
+    end = 1.0 if share else 100.0
+    ds = solved(with_(P.Source(2.0, varying=varying), initial=I.empty()), [end])
+    assert moment(ds, 1)[0] == pytest.approx(2 * share if share else 72.0, rel=CLOSE)
+
+
+def test_kinks_cost_no_accuracy():
+    varying = "max(0, sin(2*pi*t))"
+    ds = solved(with_(P.Removal(1, varying=varying)), [3.25])
+    right = closed.diluted_number(
+        1.0, lambda t: max(0.0, math.sin(2 * math.pi * t)), 3.25, [0.5 * k for k in range(1, 7)]
+    )
+    assert number(ds)[0] == pytest.approx(right, rel=CLOSE)
+    assert moment(ds, 1)[0] == pytest.approx(math.exp(-3.5 / math.pi), rel=CLOSE)
+
+
+# Gelation
+
+
+@pytest.mark.parametrize(
+    "initial",
+    [I.monodisperse(3.0), I.exponential(1.5), I.monodisperse(1 / 3, size=3)],
+    ids=["three monomers", "exponential", "trimers"],
+)
+@pytest.mark.parametrize("kernel", [sx.kernels.Multiplicative(), sx.kernels.formula("i*j")])
+def test_gel_time(kernel, initial):
+    # 1 / M2 at the start: 1/3 for all three
+    model = sx.Model(kernel, initial=initial)
+    ds = solved(model, np.linspace(0.0, 0.32, 33))
+    assert analysis.gelation(ds).attrs["gel_time"] == pytest.approx(1 / 3, rel=1e-3)
+
+
+@pytest.mark.parametrize("times", [[1.5, 2.0], [0.5, 1.5, 2.0]])
+@pytest.mark.parametrize("kernel", [sx.kernels.Multiplicative(), sx.kernels.formula("i*j")])
+def test_gel_fraction_is_of_the_mass_at_the_start(kernel, times):
+    with pytest.warns(SmoluxWarning, match="gel"):
+        ds = solved(sx.Model(kernel), times)
+    found = analysis.gel_fraction(ds).values[0]
+    np.testing.assert_allclose(found[-2:], [1 / 3, 1 / 2], atol=1e-3)  # Stockmayer
+
+
+# The matrix, some of it
+
+FAST = [
+    ("monomers", "constant", ("shattering",), "pulse"),
+    ("monomers", "ballistic", ("evaporation", "source"), "box"),
+    ("monomers", "additive", ("removal above",), "none"),
+    ("2", "Brownian", ("debris",), "ramp"),
+    ("2", "formula", ("scission", "dilution"), "periodic"),
+    ("20", "constant", ("breakage",), "box"),
+    ("20", "Brownian", ("source of large",), "none"),
+    ("32", "formula", ("evaporation",), "none"),
+    ("33", "ballistic", (), "none"),
+    ("47", "Brownian", ("deposition",), "pulse"),
+    ("100", "constant", ("evaporation",), "none"),
+    ("1 and 100", "multiplicative", (), "none"),
+    ("1, few of 60", "additive", ("dilution",), "periodic"),
+    ("3, 7 and 50", "additive", ("removal above",), "none"),
+    ("95 to 105", "multiplicative", (), "none"),
+    ("exponential 10", "formula", ("debris", "evaporation"), "ramp"),
+    ("lognormal 100, 1.05", "constant", ("source",), "none"),
+    ("lognormal 20, 2", "Brownian", (), "none"),
+    ("empty", "ballistic", ("source",), "ramp"),
+    ("empty", "constant", ("source of both", "removal above"), "pulse"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("at", range(len(FAST)), ids=lambda k: " ".join(map(str, FAST[k])))
+def test_cells_of_the_matrix(at):
+    start, kernel, processes, varying = FAST[at]
+    case = cell(start, kernel, *processes, varying=varying)
+    exact = reference.solve(case.problem, case.times)
+    small = exact.window <= 1000
+    ds = solved(case.model, case.times, method=("low-rank", "direct")[at % 2 if small else 0])
+    errors = judge.compare(ds, exact)
+    assert max(errors.values()) < CLOSE, errors
+
+
+# Two windows, two tolerances
+
+TWICE = {
+    "47": with_(kernel=sx.kernels.Ballistic(), initial=I.monodisperse(size=47)),
+    "shattered": with_(P.Shattering(0.2), kernel=sx.kernels.Ballistic()),
+    "lognormal": with_(kernel=sx.kernels.Brownian(), initial=I.lognormal(20, 1.5)),
+    "open": with_(P.Source({1: 1.0, 90: 0.01}), P.Removal("0.2*sqrt(k)"), initial=I.empty()),
+    "pulse": with_(P.Evaporation(0.3), P.Source(1.0, varying="9*exp(-((t-0.3)/0.01)**2)")),
+}
+
+
+@pytest.mark.parametrize("name", TWICE)
+def test_tolerance_is_the_error(name):
+    times = [0.2, 0.6]
+    exact = solved(TWICE[name], times, tolerance=1e-10)
+    for tolerance in (1e-4, 1e-6, 1e-8):
+        ds = solved(TWICE[name], times, tolerance=tolerance)
+        np.testing.assert_allclose(ds["moment"], exact["moment"], rtol=10 * tolerance)
+        np.testing.assert_allclose(ds["events"], exact["events"], rtol=10 * tolerance)
+
+
+@pytest.mark.parametrize("name", TWICE)
+def test_window_does_not_matter(name):
+    times = [0.2, 0.6]
+    chosen = solved(TWICE[name], times)
+    for largest in (3000, 4500):
+        ds = solved(TWICE[name], times, largest=largest, method="low-rank")
+        np.testing.assert_allclose(ds["moment"], chosen["moment"], rtol=CLOSE)
+        np.testing.assert_allclose(ds["events"], chosen["events"], rtol=CLOSE)
