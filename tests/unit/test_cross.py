@@ -8,12 +8,12 @@ import pytest
 import smolux as sx
 from smolux.deterministic.cross import (
     MAX_RANK,
-    Sample,
     cross_approximation,
     given_factors,
     interpolation,
 )
 from smolux.deterministic.operator import Direct, LowRank, OperatorFactory
+from smolux.deterministic.trial import Sample
 from smolux.errors import InputError
 
 LAWS = [sx.kernels.by_name(name) for name in ("brownian", "ballistic", "shear")]
@@ -44,7 +44,7 @@ def densities(m, count=3):
 @pytest.mark.parametrize("law", LAWS)
 def test_every_entry_is_within_the_tolerance(law, tolerance):
     kernel = law()
-    factors = cross_approximation(kernel, 700, tolerance)
+    factors = cross_approximation(Sample(kernel, 700), tolerance)
     exact = matrix(kernel, 700)
     found = factors.rows.T @ factors.core @ factors.rows
     assert np.abs(found / exact - 1).max() < 10 * tolerance
@@ -60,13 +60,13 @@ def test_exact_ranks_are_found():
         ("(i/j)**0.9 + (j/i)**0.9", 2),
         ("(cbrt(i) + cbrt(j)) * (1/cbrt(i) + 1/cbrt(j))", 3),
     ):
-        factors = cross_approximation(sx.kernels.formula(text), 3000, 1e-9)
+        factors = cross_approximation(Sample(sx.kernels.formula(text), 3000), 1e-9)
         assert factors.rank == rank, text
         assert factors.error < 1e-9
 
 
 def test_function_of_the_sum_is_split_off():
-    factors = cross_approximation(sx.kernels.Ballistic(), 2000, 1e-11, power=0.5)
+    factors = cross_approximation(Sample(sx.kernels.Ballistic(), 2000), 1e-11, power=0.5)
     assert factors.rank == 3
     assert factors.error < 1e-12
     exact = matrix(sx.kernels.Ballistic(), 2000)
@@ -74,12 +74,12 @@ def test_function_of_the_sum_is_split_off():
 
 
 def test_units_do_not_matter():
-    factors = cross_approximation(sx.kernels.Ballistic(scale=1e-17), 1000, 1e-9)
+    factors = cross_approximation(Sample(sx.kernels.Ballistic(scale=1e-17), 1000), 1e-9)
     assert factors.error < 1e-8
 
 
 def test_far_from_low_rank_is_told():
-    assert cross_approximation(sx.kernels.Sedimentation(), 2000, 1e-6) is None
+    assert cross_approximation(Sample(sx.kernels.Sedimentation(), 2000), 1e-6) is None
     with pytest.raises(InputError, match="far from low rank"):
         OperatorFactory(sx.kernels.Sedimentation(), "low-rank", 1e-9)(2000)
     assert isinstance(OperatorFactory(sx.kernels.Sedimentation(), "auto", 1e-9)(500), Direct)
@@ -97,26 +97,26 @@ def test_a_ridge_between_the_nodes_is_seen():
 def test_kernel_that_vanishes_for_most_pairs():
     # monomers are added, nothing else happens: X1 of the theory of addition and shattering
     kernel = sx.kernels.from_function(lambda i, j: 1.0 * ((i == 1) | (j == 1)) + 1.0 * (i * j == 1))
-    factors = cross_approximation(kernel, 300, 1e-9)
+    factors = cross_approximation(Sample(kernel, 300), 1e-9)
     found = factors.rows.T @ factors.core @ factors.rows
     np.testing.assert_allclose(found, matrix(kernel, 300), atol=1e-9)
 
 
 def test_interpolation_is_nearly_exact():
     for kernel in (sx.kernels.Ballistic(), sx.kernels.Brownian()):
-        factors = interpolation(kernel, 3000)
+        factors = interpolation(Sample(kernel, 3000))
         assert Sample(kernel, 3000).errors(factors).max() < 1e-12
-    assert interpolation(sx.kernels.Sedimentation(), 3000) is None
+    assert interpolation(Sample(sx.kernels.Sedimentation(), 3000)) is None
 
 
 def test_given_factors_hold_each_row_once():
     kernel = sx.kernels.GeneralizedBrownian(0.95)
-    factors = given_factors(kernel, 500)
+    factors = given_factors(Sample(kernel, 500))
     assert factors.rank == 2
     np.testing.assert_allclose(
         factors.rows.T @ factors.core @ factors.rows, matrix(kernel, 500), rtol=1e-13
     )
-    assert given_factors(sx.kernels.Ballistic(), 10) is None
+    assert given_factors(Sample(sx.kernels.Ballistic(), 10)) is None
 
 
 @pytest.mark.parametrize("law", [*LAWS, sx.kernels.by_name("sedimentation")])

@@ -131,3 +131,62 @@ def test_lognormal_densities_are_exact_in_the_tail():
         )[0]
         assert n[k - 1] == pytest.approx(exact, rel=1e-7)
     np.testing.assert_allclose(n, np.diff(law.cumulative(np.arange(6001.0))), atol=2e-16)
+
+
+def antidiagonal(i, j):
+    return 1e-9 + 1.0 * (i + j == 1001)
+
+
+RARE = {
+    "a sum that the function names": sx.kernels.from_function(antidiagonal),
+    "a sum in a formula": sx.kernels.formula("max(1e-9, 1 - abs(i + j - 1001))"),
+    "a pair in a formula": sx.kernels.formula(
+        "1e-9 + max(0, 1 - abs(i - 300) - abs(j - 501)) + max(0, 1 - abs(j - 300) - abs(i - 501))"
+    ),
+    "a pair that the function names": sx.kernels.from_function(
+        lambda i, j: 1e-9 + 1.0 * (i * j == 300 * 501) * (i + j == 801)
+    ),
+    "a sum of no name": sx.kernels.from_function(
+        lambda i, j, at=700.0: 1.0 - np.exp(-((i + j - at - 1) ** 2))
+    ),
+    "one size": sx.kernels.formula("1 + 5*exp(-(i - 613)**2) + 5*exp(-(j - 613)**2)"),
+}
+
+
+@pytest.mark.parametrize("case", RARE)
+def test_what_is_rare_is_not_missed(case):
+    kernel = RARE[case]
+    operator = OperatorFactory(kernel, "auto", 1e-9)(1100)
+    k = np.arange(1.0, 1101.0)
+    np.testing.assert_allclose(
+        operator.columns(1100), kernel(k[:, None], k), rtol=1e-8, atol=2e-6 * kernel(1, 2)
+    )
+
+
+def test_factors_that_miss_pairs_are_refused_with_one():
+    with pytest.raises(sx.InputError, match=r"factors found for the kernel miss K\(\d+, \d+\) = "):
+        OperatorFactory(RARE["a sum that the function names"], "low-rank", 1e-9)(1100)
+
+
+def test_solution_with_a_rare_pair():
+    # 400 and 601 meet, nothing else does: dn/dt = -n**2 for both
+    start = sx.initial.from_sizes({400: 0.5, 601: 0.5})
+    model = sx.Model(RARE["a sum that the function names"], initial=start)
+    with pytest.warns(sx.SmoluxWarning, match="all pairs are summed"):
+        ds = sx.solve(model, [1.0], largest=1100)
+    assert ds["number_density"].item() == pytest.approx(0.5 + 1 / 3, abs=1e-8)
+
+
+@pytest.mark.parametrize("method", ["direct", "auto", "low-rank"])
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        # zero or more at powers of two and their neighbours, where a model tries it
+        ("1 - 40*max(0, 1 - abs(i - 41) - abs(j - 41))", r"K\(41, 41\) = -39: negative"),
+        ("sqrt(abs(i - 100) + abs(j - 41) - 0.5)", "not a number"),
+    ],
+)
+def test_values_that_are_no_rates_are_refused_with_the_pair(text, message, method):
+    kernel = sx.kernels.formula(text)
+    with pytest.raises(sx.InputError, match=message):
+        OperatorFactory(kernel, method, 1e-9)(200)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from ..kernels.base import Kernel
+from .trial import FLOOR, Sample, values
 
 Float = NDArray[np.float64]
 
@@ -16,11 +17,7 @@ Float = NDArray[np.float64]
 MAX_RANK = 48
 #: sizes on which pivots are sought: all small ones, and so many spread evenly in log k
 _SMALL, _NODES = 24, 192
-#: pairs that factors are tried on: so many of a kind, and of so many sizes each
-_SAMPLES, _SIZES = 1024, 1 << 16
 _ROUNDS = 4
-#: entries below this share of the largest are only approximated to within it
-_FLOOR = 1e-6
 #: a 1 x 1 pivot is taken if it is at least this share of the largest entry (Bunch and Parlett 1971)
 _BUNCH_PARLETT = 0.6404
 
@@ -37,13 +34,16 @@ class Factors:
     power : float
         Exponent of the factor that depends on ``i + j`` alone.
     error : float
-        The largest relative error found on random pairs of sizes.
+        The largest relative error found, see `Sample`.
+    worst : (int, int)
+        The pair of sizes that has it.
     """
 
     rows: Float
     core: Float
     power: float = 0.0
     error: float = 0.0
+    worst: tuple[int, int] = (1, 1)
 
     @property
     def rank(self) -> int:
@@ -65,9 +65,9 @@ class Factors:
         return values
 
 
-def given_factors(kernel: Kernel, largest: int) -> Factors | None:
+def given_factors(sample: Sample) -> Factors | None:
     """Return the exact factors that a law gives, each different row once; None if it gives none."""
-    pair = kernel.factors(np.arange(1.0, largest + 1.0))
+    pair = sample.kernel.factors(np.arange(1.0, sample.largest + 1.0))
     if pair is None:
         return None
     rows: list[Float] = []
@@ -82,8 +82,7 @@ def given_factors(kernel: Kernel, largest: int) -> Factors | None:
     for (r, a), (s, b) in zip(*weights, strict=True):
         core[r, s] += 0.5 * a * b
         core[s, r] += 0.5 * a * b
-    found = Factors(np.array(rows), core)
-    return Factors(found.rows, core, error=float(Sample(kernel, largest).errors(found).max()))
+    return sample.tried(Factors(np.array(rows), core))
 
 
 def _find(rows: list[Float], row: Float) -> tuple[int, float]:
@@ -98,7 +97,7 @@ def _find(rows: list[Float], row: Float) -> tuple[int, float]:
 
 
 def cross_approximation(
-    kernel: Kernel, largest: int, tolerance: float, power: float = 0.0, max_rank: int = MAX_RANK
+    sample: Sample, tolerance: float, power: float = 0.0, max_rank: int = MAX_RANK
 ) -> Factors | None:
     """Find low-rank factors of a symmetric kernel from few of its entries.
 
@@ -109,9 +108,8 @@ def cross_approximation(
 
     Parameters
     ----------
-    kernel : Kernel
-    largest : int
-        The number of sizes M.
+    sample : Sample
+        Of the kernel: pairs on which the factors are tried.
     tolerance : float
         Largest error of an entry relative to it.
     power : float
@@ -122,33 +120,32 @@ def cross_approximation(
     Returns
     -------
     Factors or None
-        None if the rank is too large, or random entries are off by more than ten tolerances.
+        With an `error` above ten tolerances if they miss entries; None if the rank is too large
+        at once.
 
     References
     ----------
     M. Bebendorf, Numer. Math. 86, 565 (2000), doi:10.1007/PL00005410 (cross approximation);
     J. R. Bunch and B. N. Parlett, SIAM J. Numer. Anal. 8, 639 (1971), doi:10.1137/0708060 (pivots).
     """
-    extra = np.empty(0, np.int64)
-    for attempt in range(_ROUNDS):
+    kernel, largest = sample.kernel, sample.largest
+    found, extra = None, np.empty(0, np.int64)
+    for _ in range(_ROUNDS):
         nodes = _nodes(largest, extra)
         blocks = _eliminate(kernel, nodes, tolerance, power, max_rank)
         if blocks is None:
-            return None
+            break
         rows, core = _extend(kernel, nodes, blocks, largest, power)
-        factors = Factors(*_recompress(kernel, rows, core, tolerance, power), power)
-        sample = Sample(kernel, largest, attempt)
-        errors = sample.errors(factors)
-        worst = float(errors.max())
-        if worst <= 10.0 * tolerance:
-            return Factors(factors.rows, factors.core, power, worst)
+        found = sample.tried(Factors(*_recompress(kernel, rows, core, tolerance, power), power))
+        if found.error <= 10.0 * tolerance:
+            break
         # sizes between the nodes matter: let those with the largest errors be nodes too
-        bad = np.argsort(errors)[-64:]
+        bad = np.argsort(sample.errors(found))[-64:]
         extra = np.concatenate([extra, sample.i[bad], sample.j[bad]])
-    return None
+    return found
 
 
-def interpolation(kernel: Kernel, largest: int, tolerance: float = 1e-13) -> Factors | None:
+def interpolation(sample: Sample, tolerance: float = 1e-13) -> Factors | None:
     """Interpolate a kernel in the logarithms of both sizes, by polynomials at Chebyshev points.
 
     Of higher rank than a cross approximation, but free of its rounding: close to machine accuracy
@@ -156,9 +153,8 @@ def interpolation(kernel: Kernel, largest: int, tolerance: float = 1e-13) -> Fac
 
     Parameters
     ----------
-    kernel : Kernel
-    largest : int
-        The number of sizes M.
+    sample : Sample
+        Of the kernel: pairs on which the factors are tried.
     tolerance : float
         Largest error of an entry relative to it.
 
@@ -167,8 +163,7 @@ def interpolation(kernel: Kernel, largest: int, tolerance: float = 1e-13) -> Fac
     Factors or None
         None if the law is not smooth enough.
     """
-    x = np.log(np.arange(1.0, largest + 1.0))
-    sample = Sample(kernel, largest)
+    x = np.log(np.arange(1.0, sample.largest + 1.0))
     found = None
     for count in range(16, 97, 16):
         angle = np.pi * np.arange(count) / (count - 1)
@@ -183,11 +178,10 @@ def interpolation(kernel: Kernel, largest: int, tolerance: float = 1e-13) -> Fac
         at_node = hit.any(axis=0)
         rows[:, at_node] = hit[:, at_node]
         sizes = np.exp(nodes)
-        factors = Factors(rows, kernel(sizes[:, None], sizes[None, :]))
-        error = float(sample.errors(factors).max())
-        if found is None or error < found.error:
-            found = Factors(rows, factors.core, error=error)
-        if error <= tolerance:
+        factors = sample.tried(Factors(rows, sample.kernel(sizes[:, None], sizes[None, :])))
+        if found is None or not found.error <= factors.error:
+            found = factors
+        if found.error <= tolerance:
             break
     return found if found is not None and found.error <= 100.0 * tolerance else None
 
@@ -199,8 +193,8 @@ def _nodes(largest: int, extra: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _entries(kernel: Kernel, i: Float, j: Float, power: float) -> Float:
-    values = kernel(i, j)
-    return values / (i + j) ** power if power else values
+    found = values(kernel, i, j)
+    return found / (i + j) ** power if power else found
 
 
 def _scale(kernel: Kernel, sizes: Float, power: float) -> Float:
@@ -220,7 +214,7 @@ def _eliminate(
     g = _scale(kernel, sizes, power)
     matrix = _entries(kernel, sizes[:, None], sizes[None, :], power) / np.outer(g, g)
     top = np.abs(matrix).max()
-    weight = 1.0 / (np.abs(matrix) + _FLOOR * top)
+    weight = 1.0 / (np.abs(matrix) + FLOOR * top)
     noise = 64.0 * np.finfo(float).eps * top
     residual = matrix.copy()
     blocks: list[tuple[NDArray[np.int64], Float]] = []
@@ -272,30 +266,3 @@ def _recompress(
     share = np.abs(values) * np.abs(rows).max(axis=0) ** 2
     keep = share > 0.02 * tolerance
     return np.ascontiguousarray((rows[:, keep] * g).T), np.diag(values[keep])
-
-
-class Sample:
-    """Pairs of sizes on which factors are tried: each with itself, each with any, small with any.
-
-    Attributes
-    ----------
-    i, j : ndarray of int64
-    """
-
-    def __init__(self, kernel: Kernel, largest: int, seed: int = 0) -> None:
-        rng = np.random.default_rng([largest, seed])
-        each = rng.permutation(largest)[:_SIZES] + 1
-        any_size = rng.integers(1, largest + 1, each.size)
-        spread = np.floor((largest + 1.0) ** rng.random((2, _SAMPLES))).astype(np.int64)
-        small = rng.integers(1, min(largest, 64) + 1, _SAMPLES)
-        mixed = np.stack([small, rng.integers(1, largest + 1, _SAMPLES)])
-        paired = np.stack([np.tile(each, 2), np.concatenate([each, any_size])])
-        pairs = np.concatenate([paired, spread, mixed], axis=1)
-        self.i, self.j = np.minimum(pairs, largest)
-        self._exact = kernel(self.i.astype(float), self.j.astype(float))
-        floor = _FLOOR * max(float(np.abs(self._exact).max()), 1e-300)
-        self._scale = np.abs(self._exact) + floor
-
-    def errors(self, factors: Factors) -> Float:
-        """Return the errors of factors relative to the kernel."""
-        return np.abs(factors(self.i, self.j) - self._exact) / self._scale

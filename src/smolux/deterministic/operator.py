@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..kernels.base import Kernel
-from .cross import cross_approximation, given_factors, interpolation
+from .cross import Factors, cross_approximation, given_factors, interpolation
 from .low_rank import LowRank
+from .trial import Sample, values
 
 Float = NDArray[np.float64]
 
@@ -82,7 +83,7 @@ class Direct:
         sizes = np.arange(1.0, m + 1.0)
         rows = max(1, min(_BLOCK // m, -(-m // 8)))
         for a in range(0, m, rows):
-            yield a, np.ascontiguousarray(self.kernel(sizes[a : a + rows, None], sizes[None, :]))
+            yield a, np.ascontiguousarray(values(self.kernel, sizes[a : a + rows, None], sizes))
 
     def loss(self, n: Float) -> Float:
         """See `Operator.loss`."""
@@ -137,7 +138,7 @@ class Direct:
     def columns(self, count: int) -> Float:
         """See `Operator.columns`."""
         sizes = np.arange(1.0, self.largest + 1.0)
-        return self.kernel(sizes[:, None], sizes[None, :count])
+        return values(self.kernel, sizes[:, None], sizes[:count])
 
     def prepare(self, n: Float | None) -> None:
         """See `Operator.prepare`; there is nothing to adapt."""
@@ -163,6 +164,7 @@ class OperatorFactory:
         self.kernel, self.method = kernel, method
         self.tolerance = float(np.clip(tolerance, 1e-13, 1e-6))
         self.notes: list[str] = []
+        self._missed = ""
 
     @property
     def may_change(self) -> bool:
@@ -187,8 +189,10 @@ class OperatorFactory:
             if self.method == "low-rank":
                 raise InputError(
                     f"method = 'low-rank': the {self.kernel.label} kernel is far from low rank on "
-                    f"{largest} sizes; use method='auto' or 'direct'"
+                    f"{largest} sizes{self._missed}; use method='auto' or 'direct'"
                 )
+            if self._missed and largest >= _TRIAL:
+                self._note(f"all pairs are summed, which takes longer{self._missed}")
             return Direct(self.kernel, largest)
         if self.method == "auto":
             length = 2 * largest
@@ -198,27 +202,41 @@ class OperatorFactory:
         return operator
 
     def _low_rank(self, largest: int) -> LowRank | None:
-        factors = given_factors(self.kernel, largest)
+        self._missed = ""
+        sample = Sample(self.kernel, largest)
+        factors = given_factors(sample)
         if factors is not None:
             return LowRank(factors, factors, self.tolerance)
         # the relative speed of free particles, sqrt(1/i + 1/j), holds a function of i + j
         for power in (0.5,):
-            exact = cross_approximation(self.kernel, largest, 1e-11, power, max_rank=5)
-            loss = interpolation(self.kernel, largest) if exact is not None else None
+            exact = cross_approximation(sample, 1e-11, power, max_rank=5)
+            loss = interpolation(sample) if exact is not None and exact.error <= 1e-10 else None
             if exact is not None and loss is not None:
                 return LowRank(exact, loss, self.tolerance)
         tolerance = self.tolerance
         while tolerance <= 1e-6:
-            factors = cross_approximation(self.kernel, largest, tolerance)
-            if factors is not None:
+            factors = cross_approximation(sample, tolerance)
+            if factors is not None and factors.error <= 10.0 * tolerance:
                 if tolerance > self.tolerance:
                     self._note(
                         f"low-rank factors of the kernel found to {tolerance:.0e} relative only"
                     )
                 return LowRank(factors, factors, self.tolerance)
+            if factors is not None and not self._missed:
+                self._missed = _miss(self.kernel, factors)
             tolerance *= 10.0
         return None
 
     def _note(self, text: str) -> None:
         if text not in self.notes:
             self.notes.append(text)
+
+
+def _miss(kernel: Kernel, factors: Factors) -> str:
+    """Say where factors are wrong."""
+    i, j = factors.worst
+    found = float(factors(np.array([i]), np.array([j]))[0])
+    return (
+        f": the factors found for the kernel miss K({i}, {j}) = {float(kernel(i, j)):.6g}, where "
+        f"they give {found:.6g}"
+    )

@@ -21,6 +21,7 @@ _SMALL = 16
 _REACHED = 20
 #: relative difference of K(i, j) and K(j, i) that rounding may explain
 _ASYMMETRY = 1e-9
+_NEGATIVE = "negative; a rate is zero or more, as in max(K, 0)"
 _LIMIT = "look for a division by zero, and limit what grows, as in exp(min(x, 500))"
 
 
@@ -31,6 +32,13 @@ def sample_sizes(largest: float) -> Float:
     return np.unique(
         np.concatenate([np.arange(1.0, _SMALL + 1), powers, powers[::3] - 1, powers[1::3] + 1])
     )
+
+
+def verdict(value: float) -> str:
+    """Return what is wrong with a rate that is negative or not finite, and the cure."""
+    if np.isnan(value):
+        return "not a number; look for 0/0 or a root or logarithm of a negative number"
+    return f"infinite; {_LIMIT}" if np.isinf(value) else _NEGATIVE
 
 
 def law_problems(kernel: Kernel, largest: float) -> list[str]:
@@ -56,11 +64,9 @@ def law_problems(kernel: Kernel, largest: float) -> list[str]:
             problems.append(f"{where}: {pair}{more}: {verdict}")
 
     finite = np.isfinite(values)
-    report(
-        np.isnan(values), "not a number; look for 0/0 or a root or logarithm of a negative number"
-    )
-    report(np.isinf(values), f"infinite; {_LIMIT}")
-    report(finite & (values < 0), "negative; a rate is zero or more, as in max(K, 0)")
+    report(np.isnan(values), verdict(np.nan))
+    report(np.isinf(values), verdict(np.inf))
+    report(finite & (values < 0), verdict(-1.0))
     with np.errstate(all="ignore"):
         gap = np.abs(values - mirrored) > _ASYMMETRY * np.maximum(np.abs(values), np.abs(mirrored))
     index = np.flatnonzero(gap & finite & np.isfinite(mirrored))
