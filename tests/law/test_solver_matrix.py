@@ -455,7 +455,7 @@ def test_tolerance_is_the_error(name):
 def test_window_does_not_matter(name):
     times = [0.2, 0.6]
     chosen = solved(TWICE[name], times)
-    for largest in (3000, 4500):
-        ds = solved(TWICE[name], times, largest=largest, method="low-rank")
+    for window in (3000, 4500):
+        ds = solved(TWICE[name], times, window=window, method="low-rank")
         np.testing.assert_allclose(ds["moment"], chosen["moment"], rtol=CLOSE)
         np.testing.assert_allclose(ds["events"], chosen["events"], rtol=CLOSE)

@@ -35,7 +35,7 @@ def _ways(window: int) -> dict[str, dict[str, Any]]:
     if window <= DIRECT:
         ways["direct"] = {"method": "direct"}
     if window <= _FIXED:
-        ways["direct, fixed"] = {"method": "direct", "largest": window}
+        ways["direct, fixed"] = {"method": "direct", "window": window}
     return ways
 
 
