@@ -380,7 +380,7 @@ def test_kinks_cost_no_accuracy():
 def test_gel_time(kernel, initial):
     # 1 / M2 at the start: 1/3 for all three
     model = sx.Model(kernel, initial=initial)
-    ds = solved(model, np.linspace(0.0, 0.32, 33))
+    ds = solved(model, np.linspace(0.0, 0.25, 26))
     assert analysis.gelation(ds).attrs["gel_time"] == pytest.approx(1 / 3, rel=1e-3)
 
 
@@ -441,21 +441,25 @@ TWICE = {
 }
 
 
+def same(ds, exact, tolerance):
+    for what in ("moment", "events"):
+        scale = exact[what].max("time")  # before the pulse there is exp(-100) of it
+        np.testing.assert_allclose(ds[what] / scale, exact[what] / scale, tolerance, atol=1e-40)
+
+
 @pytest.mark.parametrize("name", TWICE)
 def test_tolerance_is_the_error(name):
     times = [0.2, 0.6]
     exact = solved(TWICE[name], times, tolerance=1e-10)
     for tolerance in (1e-4, 1e-6, 1e-8):
         ds = solved(TWICE[name], times, tolerance=tolerance)
-        np.testing.assert_allclose(ds["moment"], exact["moment"], rtol=10 * tolerance)
-        np.testing.assert_allclose(ds["events"], exact["events"], rtol=10 * tolerance)
+        same(ds, exact, 10 * tolerance)
 
 
 @pytest.mark.parametrize("name", TWICE)
 def test_window_does_not_matter(name):
     times = [0.2, 0.6]
     chosen = solved(TWICE[name], times)
-    for window in (3000, 4500):
+    for window in (12_000, 18_000):
         ds = solved(TWICE[name], times, window=window, method="low-rank")
-        np.testing.assert_allclose(ds["moment"], chosen["moment"], rtol=CLOSE)
-        np.testing.assert_allclose(ds["events"], chosen["events"], rtol=CLOSE)
+        same(ds, chosen, CLOSE)
