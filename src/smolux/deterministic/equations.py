@@ -71,6 +71,7 @@ class Equations:
         self.operator: Operator = self._factory(count)
         self._terms = [term_of(process, self.sizes) for process in self.processes]
         self._bands, self._tilted = np.empty((count, 0)), False
+        self._beyond: Float | None = None
         self._gel = gel_affinity(self.model.kernel, self.sizes) if self._gel_reacts else None
 
     def refine(self, n: Float) -> bool:
@@ -125,6 +126,7 @@ class Equations:
         meeting, flow = Meeting(self.operator, self.sizes, n), Flow.none(n, len(self.processes))
         for p, term in enumerate(self._terms):
             term.add(p, self._factor(p, times), n, meeting, flow)
+        self._beyond = None if meeting.beyond is None else meeting.beyond[-1]
         if self._gel is not None:
             self._to_gel(n, self._factor(0, times), flow)
         if self.cut:
@@ -134,13 +136,15 @@ class Equations:
     def beyond(self, t: float, n: Float) -> Float:
         """Return what appears per time of the sizes above the last one, up to twice that.
 
-        Nothing where it leaves the system.
+        Nothing where it leaves the system. For the densities of the last call of `rates` if the
+        sums held it, which are those of the end of a step, else for `n`.
         """
         merged = [p for p, process in enumerate(self.pairs) if _merges(process)]
         if self.cut or not merged:
             return np.zeros_like(n)
         factor = sum(float(self._factor(p, np.array([t]))[0]) for p in merged)
-        return factor * self.operator.beyond(n)
+        found = self._beyond if self._beyond is not None else self.operator.beyond(n)
+        return factor * found
 
     def _to_gel(self, n: Float, factor: Float, flow: Flow) -> None:
         """Let the mass beyond the window take up particles."""

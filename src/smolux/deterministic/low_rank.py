@@ -69,11 +69,10 @@ class LowRank:
         """See `Operator.gain`."""
         return self._all(n)[:, : self.largest]
 
-    def gain_and_over(self, n: Float) -> tuple[Float, tuple[Float, Float]]:
-        """See `Operator.gain_and_over`: the transforms are long enough to hold all sums."""
+    def gain_and_beyond(self, n: Float) -> tuple[Float, Float]:
+        """See `Operator.gain_and_beyond`: the transforms are long enough to hold all sums."""
         total = self._all(n)
-        over = total[:, self.largest :]
-        return total[:, : self.largest], (over.sum(axis=1), over @ (self.largest + self.sizes))
+        return total[:, : self.largest], total[:, self.largest :]
 
     def beyond(self, n: Float) -> Float:
         """See `Operator.beyond`."""

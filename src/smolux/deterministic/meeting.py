@@ -23,10 +23,17 @@ class Meeting:
     operator : Operator
     sizes : ndarray of shape (M,)
     n : ndarray of shape (S, M)
+
+    Attributes
+    ----------
+    beyond : ndarray of shape (S, M) or None
+        Pairs that together have each size above the last one, if the operator found them with the
+        gain.
     """
 
     def __init__(self, operator: Operator, sizes: Float, n: Float) -> None:
         self._operator, self._sizes, self._n = operator, sizes, n
+        self.beyond: Float | None = None
 
     @cached_property
     def loss(self) -> Float:
@@ -61,12 +68,13 @@ class Meeting:
         rounding, it is taken out by a factor, so that mass stays where it is; the number of pairs
         then still tells how large it is. More than that is left for the account to see.
         """
-        gain, over = self._operator.gain_and_over(self._n)
+        gain, self.beyond = self._operator.gain_and_beyond(self._n)
         inside = gain @ self._sizes
-        if over is None:
+        if self.beyond is None:
             number, mass = self.pairs - gain.sum(axis=1), self.mass - inside
             return gain, (np.maximum(number, 0.0), np.maximum(mass, 0.0))
-        number, mass = over[0], over[1] * self._sizes[0]
+        number = self.beyond.sum(axis=1)
+        mass = self.beyond @ (self._sizes + self._sizes[-1])
         with np.errstate(divide="ignore", invalid="ignore"):
             factor = self.mass / (inside + mass)
         factor = np.where(np.abs(factor - 1.0) <= _ROUNDING, factor, 1.0)

@@ -43,10 +43,10 @@ class Operator(Protocol):
     def gain(self, n: Float) -> Float:
         """Return ``sum_{i+j=k} K(i, j) n_i n_j / 2``, shape (S, M) as `n`."""
 
-    def gain_and_over(self, n: Float) -> tuple[Float, tuple[Float, Float] | None]:
-        """Return the gain, and number and mass of pairs larger than M together, shape (S,) each.
+    def gain_and_beyond(self, n: Float) -> tuple[Float, Float | None]:
+        """Return the gain, and that of the sizes ``M + 1 .. 2 M``, shape (S, M) each.
 
-        None for these if they are only what the others leave.
+        None for the latter if it is only found by `beyond`.
         """
 
     def beyond(self, n: Float) -> Float:
@@ -118,8 +118,8 @@ class Direct:
                 total[s, start + 1 :] += np.einsum("r,rc,rc->c", n[s, a:b], sheared, shifted)
         return total
 
-    def gain_and_over(self, n: Float) -> tuple[Float, None]:
-        """See `Operator.gain_and_over`."""
+    def gain_and_beyond(self, n: Float) -> tuple[Float, None]:
+        """See `Operator.gain_and_beyond`."""
         return self.gain(n), None
 
     def beyond(self, n: Float) -> Float:
