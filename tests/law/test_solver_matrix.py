@@ -242,7 +242,7 @@ def test_gaps_between_sizes(sizes, t):
         ({40: 1.0}, I.empty(), 4.0),
         ({64: 1.0}, I.empty(), 4.0),
         ({65: 0.5}, I.monodisperse(size=3), 4.0),
-        ({100_000: 0.1}, I.monodisperse(), 2.0),
+        ({3000: 0.1}, I.monodisperse(), 2.0),
     ],
 )
 def test_sources_of_any_size(rates, initial, t):
