@@ -2,41 +2,67 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 from scipy.sparse import linalg as krylov
 
 from ..content import frozen
 from ..errors import InputError
 from ..model import Model
 from ..processes import Aggregation
+from .arguments import renamed
 from .equations import Equations
 from .integrate import SolverError
+from .linearisation import Linearisation
 from .operator import OperatorFactory
-from .terms import Totals
 from .window import Window
 
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_LIMIT = 1 << 17
-#: bands of the preconditioner
-_BANDS = 32
-_ITERATIONS = 120
-#: relative residual of a linear system
-_SOLVED = 1e-9
-#: factor by which the time step of the continuation may grow or shrink at once
-_FASTER, _SLOWER = 10.0, 0.3
+_LIMIT = 1 << 20
+_ITERATIONS = 300
+#: relative residual of a linear system, and of one far from the steady state
+_SOLVED, _ROUGHLY = 1e-9, 1e-4
+#: residual above which the state is far from steady
+_FAR = 1e-4
+#: what a step changes of the number or the mass: aimed at, and at most
+_AIM, _MOST = 0.4, 0.8
+#: mass of negative densities that a step may leave, to be set to zero
+_NEGATIVE = 0.02
+#: factor by which the time step of the continuation grows, at least and at most, and shrinks
+_SLOWEST, _FASTEST, _SHORTER = 1.3, 10.0, 0.3
 #: sizes at the start, exponentially distributed
 _MEAN, _FIRST = 8.0, 256
-#: tolerance that decides on the number of sizes
-_WINDOW_TOLERANCE = 1e-9
+#: tolerance that decides on the number of sizes, and far from the steady state
+_WINDOW_TOLERANCE, _ROUGH_TOLERANCE = 1e-8, 1e-4
 #: an eigenvalue smaller than this, relative to the rate of collisions, is that of the mass
 _ZERO = 1e-6
+
+
+@dataclass(frozen=True)
+class SteadyProgress:
+    """How far the search for a steady state is.
+
+    Attributes
+    ----------
+    iteration : int
+    residual : float
+        As in `SteadyState`.
+    window : int
+        The number of sizes now.
+    seconds : float
+        Since the start.
+    """
+
+    iteration: int
+    residual: float
+    window: int
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -68,107 +94,34 @@ class SteadyState:
         return float(self.n @ self.sizes**order)
 
 
-class Linearisation:
-    """The rates near given densities: residual, products with the Jacobian, shifted systems.
-
-    What would leave the window comes back as monomers, so that the mass is conserved exactly. The
-    rates are quadratic in the densities, so the difference ``(f(n + v) - f(n - v)) / 2`` is the
-    product of the Jacobian with v without an error but rounding.
-
-    Parameters
-    ----------
-    equations : Equations
-    n : ndarray of shape (M,)
-    """
-
-    def __init__(self, equations: Equations, n: Float) -> None:
-        self.equations, self.n, self.sizes = equations, n, equations.sizes
-        equations.operator.prepare(n)
-        rates, along = equations.rates(np.zeros(1), n[None, :])
-        # products are with vectors that do not fall off as the densities do
-        equations.operator.prepare(None)
-        self.rates = self._closed(rates[0])
-        #: densities times these are of about the same size
-        self.weight = self.sizes**2
-        loss, gain = equations.shares(0.0)
-        frequency = loss * equations.operator.loss(n[None, :])[0] + equations.lone_losses(0.0)
-        #: collisions per time, of a particle and of the mass
-        self.scale = 2.0 * float(Totals.of(along[0]).events.sum()) / float(n.sum())
-        self.turnover = float((n * frequency) @ self.sizes)
-        count = min(_BANDS, len(n))
-        self._frequency = frequency
-        self._band = gain * equations.operator.columns(count) * n[:count]
-
-    def _closed(self, rates: Float) -> Float:
-        rates[0] -= float(rates @ self.sizes)
-        return rates
-
-    def product(self, v: NDArray[Any]) -> NDArray[Any]:
-        """Return the Jacobian times v."""
-        parts = np.array([v.real, v.imag] if np.iscomplexobj(v) else [v])
-        # of the size of the densities, so that neither drowns in the rounding of the other
-        size = float((np.abs(parts) @ self.sizes).max()) / float(self.n @ self.sizes)
-        if size == 0.0:
-            return np.zeros_like(v)
-        shifted = np.concatenate([self.n + parts / size, self.n - parts / size])
-        rates = self.equations.rates(np.zeros(len(shifted)), shifted)[0]
-        above, below = np.split(rates, 2)
-        found = [self._closed(row) for row in (above - below) * (0.5 * size)]
-        return found[0] + 1j * found[1] if len(found) == 2 else found[0]
-
-    def solve(self, shift: complex, right: NDArray[Any], tolerance: float) -> NDArray[Any]:
-        """Return ``(shift - J)^{-1} right``, by GMRES with the bands of J below the diagonal.
-
-        The part of J that the bands leave out is nearly of low rank: few iterations are needed.
-        """
-        dtype: type = complex if np.iscomplexobj(right) or isinstance(shift, complex) else float
-        matrix = np.empty((len(self.n), self._band.shape[1] + 1), dtype)
-        matrix[:, 0] = shift + self._frequency
-        matrix[:, 1:] = -self._band
-        banded = lapack.ztbtrs if dtype is complex else lapack.dtbtrs
-
-        def precondition(v: NDArray[Any]) -> NDArray[Any]:
-            return banded(matrix.T, v.astype(dtype)[:, None], uplo="L")[0][:, 0]
-
-        def act(z: NDArray[Any]) -> NDArray[Any]:
-            v = z / self.weight
-            return self.weight * precondition(shift * v - self.product(v))
-
-        count = len(self.n)
-        operator = krylov.LinearOperator((count, count), matvec=act, dtype=dtype)
-        z, _ = krylov.gmres(
-            operator,
-            self.weight * precondition(right),
-            rtol=tolerance,
-            atol=0.0,
-            restart=min(100, count),
-            maxiter=3,
-        )
-        return z / self.weight
-
-
 def steady_state(
     model: Model,
     *,
-    largest: int | None = None,
+    window: int | None = None,
     tolerance: float = 1e-11,
     guess: Float | None = None,
+    progress: Callable[[SteadyProgress], None] | None = None,
+    largest: int | None = None,
 ) -> SteadyState:
     """Find a steady state of a model, stable or not, with the mass of its initial condition.
 
-    Implicit Euler steps, each one Newton iteration, that grow as the residual falls and end as
-    Newton's method (pseudo-transient continuation).
+    Implicit Euler steps, each one Newton iteration, as long as the change in each allows, that end
+    as Newton's method (pseudo-transient continuation).
 
     Parameters
     ----------
     model : Model
         With rates that do not depend on time.
-    largest : int, optional
+    window : int, optional
         Number of sizes; grows until the rest is negligible if left out.
     tolerance : float
         For the residual, see `SteadyState`.
     guess : ndarray of shape (M,), optional
         Densities to begin with.
+    progress : callable, optional
+        Called with a `SteadyProgress` before each step.
+    largest : int, optional
+        Former name of `window`.
 
     Returns
     -------
@@ -179,13 +132,14 @@ def steady_state(
     InputError
         If a rate depends on time, or there is aggregation alone.
     SolverError
-        If none is found: mass moves to ever larger sizes.
+        If there is none: mass moves to ever larger sizes.
 
     References
     ----------
     C. T. Kelley and D. E. Keyes, SIAM J. Numer. Anal. 35, 508 (1998),
     doi:10.1137/S0036142996304796.
     """
+    window = renamed("window", window, "largest", largest)
     model = frozen(model)
     varying = [p.name for p in model.processes if p.factor.constant is None]
     if varying:
@@ -203,36 +157,92 @@ def steady_state(
             "processes: with sources or removal no mass is given that a steady state could have; "
             "solve up to a time when nothing changes any more"
         )
-    start = model.initial.densities(model.initial.largest)
-    mass = float(start @ np.arange(1.0, len(start) + 1.0))
-    window = Window(largest or _LIMIT, 2.0, _WINDOW_TOLERANCE, largest is not None)
-    n = _guess(guess, largest or _FIRST)
-    equations = Equations(model, OperatorFactory(model.kernel, "auto", 1e-12), len(n), mass)
-    step, before = np.inf, 0.0
-    for iteration in range(_ITERATIONS):
-        n = n * (mass / float(n @ equations.sizes))
-        near = Linearisation(equations, n)
-        residual = float(np.abs(near.rates) @ near.sizes) / near.turnover
-        share = window.share(n, equations.beyond(0.0, n))
-        count = window.next(len(n), share, 1.0 / near.scale, 0.0)[0]
-        if residual <= tolerance and count == len(n):
-            return SteadyState(model, n, residual, iteration)
-        if not np.isfinite(residual):
-            break
-        if iteration == 0:
-            step = (1.0 if guess is None else 1e3) / near.scale
-        else:
-            step *= float(np.clip(before / residual, _SLOWER, _FASTER))
-        before = residual
-        n = np.maximum(n + near.solve(1.0 / step, near.rates, _SOLVED), 0.0)
-        if count > len(n):
-            n = np.pad(n, (0, count - len(n)))
-            equations.resize(len(n))
-    raise SolverError(
-        f"no steady state found with up to {len(n)} sizes: is there a process that brings back "
-        "small sizes, such as shattering?",
-        np.inf,
-    )
+    return _Search(model, window, guess, progress).run(tolerance)
+
+
+class _Search:
+    """Pseudo-transient continuation on a window that grows."""
+
+    def __init__(
+        self,
+        model: Model,
+        window: int | None,
+        guess: Float | None,
+        progress: Callable[[SteadyProgress], None] | None,
+    ) -> None:
+        start = model.initial.densities(model.initial.largest)
+        self.model, self.progress, self.window = model, progress, window
+        self.mass = float(start @ np.arange(1.0, len(start) + 1.0))
+        self.n = _guess(guess, window or _FIRST)
+        factory = OperatorFactory(model.kernel, "auto", 1e-12)
+        self.equations = Equations(model, factory, len(self.n), self.mass)
+        self.started = time.perf_counter()
+        self.near_steady = guess is not None
+
+    def run(self, tolerance: float) -> SteadyState:
+        """Return the steady state."""
+        step = 0.0
+        for iteration in range(_ITERATIONS):
+            self.n *= self.mass / float(self.n @ self.equations.sizes)
+            near = Linearisation(self.equations, self.n)
+            residual = float(np.abs(near.rates) @ near.sizes) / near.turnover
+            if not np.isfinite(residual):
+                break
+            self._tell(iteration, residual)
+            if residual <= tolerance and not self._grow(_WINDOW_TOLERANCE, near.scale):
+                return SteadyState(self.model, self.n, residual, iteration)
+            if step == 0.0:
+                step = (1e3 if self.near_steady else 1.0) / near.scale
+            if residual > tolerance:
+                # no better than Newton's method can make of it, nor than is needed
+                enough = float(
+                    np.clip(max(residual, 0.03 * tolerance / residual), _SOLVED, _ROUGHLY)
+                )
+                step = self._advance(near, step, enough)
+                rough = residual > _FAR
+                self._grow(_ROUGH_TOLERANCE if rough else _WINDOW_TOLERANCE, near.scale)
+        raise self._failure()
+
+    def _advance(self, near: Linearisation, step: float, tolerance: float) -> float:
+        """Take a step, shorter if it changes too much; return the length of the next one."""
+        number, mass = float(self.n.sum()), self.mass
+        while True:
+            change = near.solve(1.0 / step, near.rates, tolerance)
+            new = self.n + change
+            share = max(
+                float(np.abs(change).sum()) / number, float(np.abs(change) @ near.sizes) / mass
+            )
+            negative = -float(np.minimum(new, 0.0) @ near.sizes) / mass
+            if share <= _MOST and negative <= _NEGATIVE:
+                break
+            step *= _SHORTER
+        self.n = np.maximum(new, 0.0)
+        return step * float(np.clip(_AIM / max(share, 1e-300), _SLOWEST, _FASTEST))
+
+    def _grow(self, tolerance: float, scale: float) -> bool:
+        """Add sizes if too much flows over the edge in a time ``1 / scale``; return whether so."""
+        window = Window(self.window or _LIMIT, 2.0, tolerance, self.window is not None)
+        operator = self.equations.operator
+        operator.prepare(self.n)
+        share = window.share(self.n, self.equations.shares(0.0)[1] * operator.beyond(self.n))
+        count = window.next(len(self.n), share, 1.0 / scale, 0.0)[0]
+        more = count - len(self.n)
+        if more > 0:
+            self.n = np.pad(self.n, (0, more))
+            self.equations.resize(count)
+        return more > 0
+
+    def _tell(self, iteration: int, residual: float) -> None:
+        if self.progress is not None:
+            seconds = time.perf_counter() - self.started
+            self.progress(SteadyProgress(iteration, residual, len(self.n), seconds))
+
+    def _failure(self) -> SolverError:
+        return SolverError(
+            f"no steady state found with up to {len(self.n)} sizes: is there a process that brings "
+            "back small sizes, such as shattering?",
+            np.inf,
+        )
 
 
 def _guess(guess: Float | None, largest: int) -> Float:
