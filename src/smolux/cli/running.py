@@ -260,7 +260,13 @@ def _computed(case: Case, directory: RunDirectory, progress: Display) -> Any:
 def _solve(case: Case, file: Path, display: Callable[..., Display]) -> Any:
     settings = case.solve_arguments()
     with display(what="solving") as progress:
-        ds = solve(case.model, **settings, progress=progress)
+        try:
+            ds = solve(case.model, **settings, progress=progress)
+        except (Interrupted, InputError, SolverError) as stop:
+            if stop.dataset is not None:  # what there was until then is right
+                _store(stop.dataset, case, file)
+                say(f"what was computed until then is in {file}")
+            raise
     _store(ds, case, file)
     say(f"solved in {duration(float(ds.attrs['wall_seconds']))}")
     return ds

@@ -172,7 +172,8 @@ class OperatorFactory:
         return self.method == "auto"
 
     def direct_sum(self, largest: int) -> Direct:
-        """Return the direct sum for the sizes ``1 .. largest``."""
+        """Return the direct sum for the sizes ``1 .. largest``, and take it from now on."""
+        self.method = "direct"
         return Direct(self.kernel, largest)
 
     @property
