@@ -117,8 +117,14 @@ def test_kernel_on_multiples():
 
 @pytest.mark.parametrize(
     ("text", "gels"),
-    [("i*j", True), ("i + j", False), ("(i*j)**0.6", True), ("i*j/(1 + i*j/1e6)", False), ("2", False)],
-)  # fmt: skip
+    [
+        ("i*j", True),
+        ("i + j", False),
+        ("(i*j)**0.6", True),
+        ("i*j/(1 + i*j/1e6)", False),
+        ("2", False),
+    ],
+)
 def test_kernels_that_do_not_say_whether_they_gel(text, gels):
     assert may_gel(sx.kernels.formula(text)) is gels
     assert may_gel(sx.kernels.formula(text, gels=not gels)) is not gels

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -23,7 +24,7 @@ def by_pieces(given, end, tolerance=1e-8):
     x, w = np.polynomial.legendre.leggauss(4)
     edges = mesh(given, end, tolerance).edges
     total = 0.0
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         first, last = within(low, high)
         t = np.clip(low + (high - low) * 0.5 * (x + 1), first, last)
         total += 0.5 * (high - low) * float(w @ function(t))

@@ -12,7 +12,7 @@ from ..processes.daughters import Merged
 from .gel import gel_affinity
 from .meeting import Meeting
 from .operator import Direct, Operator, OperatorFactory
-from .terms import Flow, term_of
+from .terms import SUMS, Flow, term_of
 
 Float = NDArray[np.float64]
 
@@ -100,7 +100,7 @@ class Equations:
     @property
     def quantities(self) -> int:
         """How many quantities `rates` gives to be integrated along, see `Totals`."""
-        return len(self.processes) + 5
+        return len(self.processes) + SUMS
 
     @property
     def processes(self) -> tuple[Process, ...]:
@@ -123,7 +123,7 @@ class Equations:
             `Totals`.
         """
         self.evaluations += len(n)
-        meeting, flow = Meeting(self.operator, self.sizes, n), Flow.none(n, len(self.processes))
+        meeting, flow = Meeting(self.operator, self.sizes, n), Flow(n, len(self.processes))
         for p, term in enumerate(self._terms):
             term.add(p, self._factor(p, times), n, meeting, flow)
         self._beyond = None if meeting.beyond is None else meeting.beyond[-1]

@@ -30,8 +30,8 @@ _FIRST_CHANGE = 0.02
 _ENTRY, _ENTRIES = 1e-9, 32
 #: share of the most particles that were ever there, below which there are none
 _NOTHING = 1e-100
-#: steps between two looks at how densities fall off
-_PREPARE = 4
+#: no moment is smaller
+_LEAST = float(np.finfo(float).tiny)
 
 
 class SolverError(RuntimeError):
@@ -65,15 +65,15 @@ class Norm:
         self._weights = (sizes / len(sizes)) ** kept[:, None]
 
     def __call__(self, error: Float, n: Float) -> float:
-        """Return the norm of `error` relative to the densities `n`."""
+        """Return the norm of `error`, or the largest of several, relative to the densities `n`."""
         moments = self._weights @ np.abs(n)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return float(np.max((self._weights @ np.abs(error)) / moments))
+        found = np.max(np.abs(error) @ self._weights.T / np.maximum(moments, _LEAST))
+        return float(found)
 
     def weights(self, n: Float) -> Float:
         """Return what an entry of an error counts at most."""
         moments = self._weights @ np.abs(n)
-        return np.asarray((self._weights / np.maximum(moments, 1e-300)[:, None]).max(axis=0))
+        return np.asarray((self._weights / np.maximum(moments, _LEAST)[:, None]).max(axis=0))
 
 
 class Integrator:
@@ -277,8 +277,6 @@ class Integrator:
         self._h = max(proposed, self._h) if h < self._h and factor > 1 else proposed
         if count > len(n):
             self._resize(count)
-        if self.steps % _PREPARE == 0:
-            self.equations.operator.prepare(self.n)
 
     @property
     def _kept(self) -> Float | None:

@@ -13,6 +13,7 @@ Float = NDArray[np.float64]
 
 #: the mass of what transforms give may be off by this share, as rounding
 _ROUNDING = 1e-10
+_LEAST = float(np.finfo(float).tiny)
 
 
 class Meeting:
@@ -75,7 +76,6 @@ class Meeting:
             return gain, (np.maximum(number, 0.0), np.maximum(mass, 0.0))
         number = self.beyond.sum(axis=1)
         mass = self.beyond @ (self._sizes + self._sizes[-1])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            factor = self.mass / (inside + mass)
+        factor = self.mass / np.maximum(inside + mass, _LEAST)
         factor = np.where(np.abs(factor - 1.0) <= _ROUNDING, factor, 1.0)
         return factor[:, None] * gain, (factor * number, factor * mass)

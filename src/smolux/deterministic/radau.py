@@ -145,7 +145,7 @@ def radau_step(
     guess : ndarray of shape (S, M)
         Where the iteration begins.
     norm : callable
-        ``norm(error, n)`` relative to the densities.
+        ``norm(error, n)`` relative to the densities, of one error or the largest of several.
     tolerance : float
         For the error of the step; a twentieth of it is allowed to the iteration.
     kept : ndarray of shape (M,), optional
@@ -175,7 +175,7 @@ def radau_step(
             correction += TABLEAU.twice[s] * np.outer(TABLEAU.vectors[:, s], part).real
         if kept is not None:
             correction += np.outer(residual @ kept - correction @ kept, n / float(n @ kept))
-        size = max(norm(row, n) for row in correction)
+        size = norm(correction, n)
         if not np.isfinite(size):
             return None
         ratio = size / previous if np.isfinite(previous) and previous > 0 else 0.0

@@ -22,15 +22,25 @@ from .splitting import Splits
 
 Float = NDArray[np.float64]
 
+#: what is integrated along beside the events
+SUMS = 5
 
-@dataclass
+
 class Flow:
     """Rates of the densities, and the account of them, of S densities at once.
+
+    Parameters
+    ----------
+    n : ndarray of shape (S, M)
+    processes : int
+        The number of processes P.
 
     Attributes
     ----------
     rates : ndarray of shape (S, M)
         ``dn/dt``.
+    along : ndarray of shape (S, P + 5)
+        What is integrated along: all of the following.
     events : ndarray of shape (S, P)
         Of each process, per unit volume and time.
     number : ndarray of shape (S,)
@@ -40,31 +50,18 @@ class Flow:
         What goes beyond the last size.
     """
 
-    rates: Float
-    events: Float
-    number: Float
-    mass_in: Float
-    mass_out: Float
-    over_number: Float
-    over_mass: Float
-
-    @classmethod
-    def none(cls, n: Float, processes: int) -> Flow:
-        """Return that of nothing."""
-        each = (np.zeros(len(n)) for _ in range(5))
-        return cls(np.zeros_like(n), np.zeros((len(n), processes)), *each)
+    def __init__(self, n: Float, processes: int) -> None:
+        self.rates = np.zeros_like(n)
+        self.along = np.zeros((len(n), processes + SUMS))
+        self.events = self.along[:, :processes]
+        self.number, self.mass_in, self.mass_out, self.over_number, self.over_mass = self.along[
+            :, processes:
+        ].T
 
     def leave(self) -> None:
         """Take out of the system what goes beyond the last size."""
         self.mass_out += self.over_mass
-        self.over_mass = np.zeros_like(self.over_mass)
-        self.over_number = np.zeros_like(self.over_number)
-
-    @property
-    def along(self) -> Float:
-        """What is integrated along, shape (S, P + 5), in the order of the fields."""
-        sums = (self.number, self.mass_in, self.mass_out, self.over_number, self.over_mass)
-        return np.hstack([self.events, *(x[:, None] for x in sums)])
+        self.over_mass[:] = self.over_number[:] = 0.0
 
 
 @dataclass(frozen=True)
@@ -86,7 +83,7 @@ class Totals:
     @classmethod
     def of(cls, along: Float) -> Totals:
         """Read what was integrated along."""
-        return cls(along[:-5].copy(), *(float(x) for x in along[-5:]))
+        return cls(along[:-SUMS].copy(), *(float(x) for x in along[-SUMS:]))
 
 
 class Term(Protocol):
