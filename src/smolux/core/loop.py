@@ -120,10 +120,11 @@ class Pieces(NamedTuple):
     ----------
     view : ``view(work, r)``
         The work arrays of replica `r`.
-    draw : ``draw(s, w, p, factor)``
+    draw : ``draw(s, w, p, factor, limit)``
         Choose the next pair into ``count[FIRST]``, ``count[SECOND]`` (-1: nothing happens then)
         and return the waiting time, the rate being `factor` times that of the kernel; NaN if a
-        rate of a pair that is present is none, which `note_bad` has noted.
+        rate of a pair that is present is none, which `note_bad` has noted. A method that looks at
+        candidates in turn stops at the first that would come after the `limit` and returns that.
     pair : ``pair(s, w)``
         Sizes of the chosen pair.
     update : ``update(s, w, gone, entries, p)``
@@ -196,7 +197,7 @@ def make_next_event(
         s.missed[IN_DOUBT] = 0.0
         wait = math.inf
         if total > 0.0:
-            wait = draw(s, w, p, total)
+            wait = draw(s, w, p, total, math.inf)
         if math.isnan(wait):
             return BAD_RATE
         schedule(s, windows, wait)

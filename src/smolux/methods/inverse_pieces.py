@@ -139,7 +139,7 @@ def _make_draw(pair_rate: Any, row_of: Any, total_of: Any) -> Any:
         return slot
 
     @cold_piece
-    def draw(s, w, p, factor):
+    def draw(s, w, p, factor, limit):
         s.count[FIRST] = -1
         s.count[TRIALS] += 1
         if not 0.0 <= s.clock[VALUE] < math.inf:

@@ -114,7 +114,7 @@ def _make_find(rate: Any) -> Any:
         return 1 if u * w.high[at(g), at(h)] < value else 0
 
     @piece
-    def find(s, w, p, factor, held, n, trials, c0, c1, c2, c3):
+    def find(s, w, p, factor, limit, held, n, trials, c0, c1, c2, c3):
         """See `smolux.core.burst.Burst`; NaN for a rate that is none, which has been noted."""
         waited, last = 0.0, trials + PATIENCE
         while trials < last:
@@ -122,8 +122,10 @@ def _make_find(rate: Any) -> Any:
                 c0, c1, c2, c3 = _draw_ahead(w, s.rng, c0, c1, c2, c3)
             k = w.meta[NEXT]
             w.meta[NEXT] = k + 1
-            trials += 1
             waited += w.wait[at(k)]
+            if limit < math.inf and waited * held[0] >= limit:
+                return limit, -1, -1, 0, 0, trials, c0, c1, c2, c3
+            trials += 1
             one, two = w.one[at(k)], w.two[at(k)]
             g, a, h, b = one >> SLOT_BITS, one & SLOT, two >> SLOT_BITS, two & SLOT
             if a >= w.number[at(g)] or b >= w.number[at(h)] or one == two:
@@ -146,11 +148,11 @@ def _make_draw(find: Any) -> Any:
     draw_one = make_draw_one(find)
 
     @piece
-    def draw(s, w, p, factor):
+    def draw(s, w, p, factor, limit):
         s.count[FIRST] = -1
         if s.count[PARTICLES] < 2 or s.clock[MAJORANT] <= 0.0:
             return math.inf
-        return draw_one(s, w, p, factor, _hold(s, w, factor))
+        return draw_one(s, w, p, factor, limit, _hold(s, w, factor))
 
     return draw
 
