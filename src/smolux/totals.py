@@ -188,6 +188,6 @@ class Totals:
 
 
 def _lacking(missed: float, events: int) -> str:
-    """Say how many events did not take place, by the estimate of `smolux.core.loop.repair`."""
+    """Say how many events did not take place, by the estimate of `smolux.core.bounds.repair`."""
     share = missed / max(events + missed, 1.0)
     return f"an estimated {missed:.3g} of its events, {share:.2g} of all, did not take place"

@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from . import rng
+from .bounds import thinned
 from .compile import cold_piece, piece
-from .loop import make_choose_process, schedule, thinned
+from .loop import make_choose_process, schedule
 from .state import (
     BAD_FACTOR,
     BAD_RATE,

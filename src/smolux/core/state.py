@@ -103,7 +103,7 @@ class State(NamedTuple):
         Sums of ``held * most`` over the slots of an octave.
     missed : float64 array of shape (R, BY_FACTOR + P)
         Estimate of the events that did not take place as a bound did not hold, see
-        `smolux.core.loop.repair`.
+        `smolux.core.bounds.repair`.
     """
 
     rng: np.ndarray

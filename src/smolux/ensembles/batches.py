@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.assembly import rates_for, windows_for
+from smolux.assembly import rates_for
 from smolux.checks import whole
 from smolux.core.rng import streams
 from smolux.core.state import BUDGET, DONE, State
@@ -30,6 +30,7 @@ from smolux.plan import Plan, make_plan
 from smolux.replicas import Group, empty_state, initial_populations
 from smolux.totals import Totals, attempts_of
 from smolux.weighting.base import Weighting
+from smolux.windows import windows_for
 
 from .moments import Moments
 

@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core import rng
+from ..core.bounds import ROUNDING, note_bad, note_largest, repair
 from ..core.burst import NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
 from ..core.levels import renew_majorant
-from ..core.loop import PATIENCE, ROUNDING, Pieces, note_bad, note_largest, repair
+from ..core.loop import PATIENCE, Pieces
 from ..core.prefetch import prefetch
 from ..core.state import (
     FIRST,

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..core import rng
+from ..core.bounds import note_bad, note_largest
 from ..core.compile import cold_piece, piece
-from ..core.loop import Pieces, note_bad, note_largest
+from ..core.loop import Pieces
 from ..core.state import FIRST, LARGEST, PARTICLES, SECOND, SINCE, STORED, TRIALS, VALUE, VOLUME
 from ..core.sums import find, find_large, shift, weigh
 from .inverse_store import double, make_visit, pair, pick, remove, seize, size_at, top_of, view

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..core import rng
+from ..core.bounds import ROUNDING, note_bad, repair
 from ..core.compile import cold_piece, piece
-from ..core.loop import PATIENCE, ROUNDING, note_bad, repair
+from ..core.loop import PATIENCE
 from ..core.prefetch import prefetch
 from ..core.segment_tree import add, find, find_mixed
 from ..core.state import FIRST, FLOOR, PARTICLES, TRIALS, VALUE, VOLUME

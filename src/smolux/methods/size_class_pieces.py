@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..core import alias, rng
+from ..core.bounds import ROUNDING, note_bad, repair
 from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
-from ..core.loop import PATIENCE, ROUNDING, Pieces, note_bad, repair
+from ..core.loop import PATIENCE, Pieces
 from ..core.prefetch import prefetch
 from ..core.slots import slot_of
 from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, TRIALS, VOLUME
