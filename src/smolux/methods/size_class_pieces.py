@@ -87,16 +87,32 @@ def _draw_ahead(w, s, a, b, c, d):
     return a, b, c, d
 
 
-@cold_piece
-def _raise_bound(s, w, g, h, i, j, value):
-    """Take in a rate above its bound."""
-    repair(s, i, j, value, w.high[g, h])
+@piece
+def _raise_bound(w, g, h, value):
     w.high[g, h] = w.high[h, g] = 1.1 * value
     w.low[g, h] = w.low[h, g] = 0.0
     w.meta[STALE] = 1
 
 
 def _make_find(rate: Any) -> Any:
+    @cold_piece
+    def look_beside(w, g, size, p):
+        """Try a size that broke one bound with one particle of each class: it may break more."""
+        for h in range(w.number.shape[0]):
+            if w.number[h] > 0:
+                other = size_of_particle(w, np.int64(h) << SLOT_BITS)
+                value = rate(float(size), float(other), *p)
+                if w.high[g, h] * ROUNDING < value < math.inf:
+                    _raise_bound(w, g, h, value)
+
+    @cold_piece
+    def broken(s, w, g, h, i, j, value, p):
+        """Take in a rate above its bound, and others that may be, before they are missed."""
+        repair(s, i, j, value, w.high[g, h])
+        _raise_bound(w, g, h, value)
+        look_beside(w, g, i, p)
+        look_beside(w, h, j, p)
+
     @piece
     def accepts(s, w, g, h, i, j, k, p):
         """Whether the rate accepts candidate `k`: 1 or 0; -1 if there is no rate."""
@@ -109,7 +125,7 @@ def _make_find(rate: Any) -> Any:
                 note_bad(s, i, j, value)
                 return -1
             if value > w.high[at(g), at(h)] * ROUNDING:
-                _raise_bound(s, w, g, h, i, j, value)
+                broken(s, w, g, h, i, j, value, p)
             return 1
         u = alias.remainder(w.table, np.uint64(column), w.rest[at(k)])
         return 1 if u * w.high[at(g), at(h)] < value else 0
