@@ -56,7 +56,8 @@ def run(
     Raises
     ------
     InputError
-        If the case has no table ``[run]``, or a method, weighting or observable is unknown.
+        If the case has no table ``[run]``, a method, weighting or observable is unknown, or the
+        figure cannot be written.
     """
     if case.run is None:
         raise InputError("efficiency: the case has no table [run], so there is nothing to simulate")
@@ -64,6 +65,10 @@ def run(
     settings = seeded.run
     assert settings is not None
     chosen = weightings_of(weightings or ("number", "mass-flow"))
+    if figure is not None:
+        from ..plotting.style import kind_of
+
+        kind_of(figure)  # before all that would be lost
     console.say(
         f"seed {settings.seed}, {settings.replicas:,} replicas of {settings.particles:,} particles"
     )
