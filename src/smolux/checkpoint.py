@@ -30,7 +30,7 @@ _UNREADABLE = (
 )  # fmt: skip
 
 #: raised whenever the content of a checkpoint changes
-VERSION = 3
+VERSION = 4
 
 
 def _weighting_to_dict(weighting: Weighting) -> dict[str, Any]:

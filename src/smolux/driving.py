@@ -27,10 +27,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _TICK = 0.2
-_EXHAUSTED = (
-    "memory: there is no more: use fewer particles, replicas, sizes or output times, or let this "
-    "process have more memory"
-)
 #: intervals below this share of the mean are rounding, of what is conserved
 _ROUNDING = 1e-12
 
@@ -151,7 +147,7 @@ class Run:
 
     def salvaged(self, error: InputError | MemoryError, *remarks: str) -> InputError:
         """Return an error found late in a run with what was computed before, which is right."""
-        found = error if isinstance(error, InputError) else OutOfMemoryError(_EXHAUSTED)
+        found = error if isinstance(error, InputError) else OutOfMemoryError()
         # no memory even for that: there may be a checkpoint
         with suppress(MemoryError):
             found.dataset = self.dataset(*found.problems, *remarks)
@@ -299,7 +295,7 @@ def run_group(plan: Plan, first: int, count: int) -> Outcome:
     except InputError as error:
         found = error
     except MemoryError:
-        found = OutOfMemoryError(_EXHAUSTED)
+        found = OutOfMemoryError()
     group.release()
     return group, found
 

@@ -7,6 +7,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 
+_EXHAUSTED = (
+    "memory: there is no more: use fewer particles, replicas, sizes or output times, or let this "
+    "process have more memory"
+)
+
 
 class InputError(ValueError):
     """A mistake in what the user wrote: names the argument, its value and the cure.
@@ -41,6 +46,9 @@ class OutOfMemoryError(InputError):
 
     With more memory it goes on from its checkpoint.
     """
+
+    def __init__(self, problems: str | Sequence[str] = _EXHAUSTED) -> None:
+        super().__init__(problems)
 
 
 class Interrupted(KeyboardInterrupt):

@@ -37,12 +37,15 @@ def adapted(executor: Any) -> Any:
     return executor
 
 
+def _is_dask(executor: Executor) -> bool:
+    return getattr(executor, "_client", None) is not None
+
+
 def workers_of(executor: Executor) -> int:
     """Tasks that an executor runs at a time; many if it does not say."""
-    client = getattr(executor, "_client", None)  # of Dask
-    if client is not None:
+    if _is_dask(executor):
         # a cluster that is only being started has none yet
-        return sum(client.nthreads().values()) or 1000
+        return sum(executor._client.nthreads().values()) or 1000  # type: ignore[attr-defined]
     found = getattr(executor, "_max_workers", None) or getattr(executor, "num_workers", None)
     return int(found) if found else 1000
 
@@ -131,7 +134,9 @@ def _round(
             for future in ended:
                 yield futures.pop(future), future
             if enough():
-                futures = {future: k for future, k in futures.items() if not future.cancel()}
+                # Dask gives up what runs, too, and begins what was submitted first
+                running = list(futures)[: workers_of(pool)] if _is_dask(pool) else []
+                futures = {f: k for f, k in futures.items() if f in running or not f.cancel()}
     finally:
         for future in futures:
             future.cancel()

@@ -23,7 +23,8 @@ _TEMPORARY = re.compile(r"\.(?P<stem>.+)\.[0-9a-f]{8}(?P<suffix>\.[^.]*)?|tmp[a-
 _looked_at: set[Path] = set()
 
 
-def _checked(path: str | os.PathLike[str]) -> Path:
+def destination(path: str | os.PathLike[str]) -> Path:
+    """Return the file that `replacing` writes, or raise an `InputError` if it cannot be one."""
     # through a link to the file it stands for, so that the link survives
     target = Path(os.path.realpath(os.path.expanduser(path)))
     if target.is_dir():
@@ -80,7 +81,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     >>> with replacing("report.html") as temporary:  # doctest: +SKIP
     ...     temporary.write_text(page)
     """
-    target = _checked(path)
+    target = destination(path)
     temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
     if target not in _looked_at:
         _looked_at.add(target)

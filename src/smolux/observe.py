@@ -7,32 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .core.splits import EXACT
-from .core.state import (
-    BY_FACTOR,
-    BY_KERNEL,
-    BY_SPLITS,
-    CLOCKS,
-    DOUBLINGS,
-    EVENTS,
-    EXTINCT,
-    FLOOR,
-    RAISED,
-    REPAIRS,
-    TRIALS,
-    WORST_I,
-    WORST_J,
-)
+from .core.state import DOUBLINGS, EXTINCT
 from .plan import Plan
-from .processes.base import LoneProcess, PairProcess
 from .records import Records
 from .replicas import Group
 from .subvolumes import Divided
+from .totals import Totals, attempts_of
 
 Float = NDArray[np.float64]
-
-#: share of candidates that become events, below which a run of so many of them warns
-_RARE, _MANY = 1e-3, 1e5
 
 
 def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
@@ -62,6 +44,7 @@ def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
     events[missing] = np.nan
     clock = np.concatenate([g.state.clock for g in groups])
     edges = plan.grid.edges.astype(float)
+    attempts = attempts_of(plan, groups)
     return Records(
         times=np.array(plan.times),
         orders=np.array(plan.orders),
@@ -76,54 +59,15 @@ def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
         n=stood / v,
         n_bin=bins[:, :, :used] / v,
         events=events,
-        attempts=_attempts(plan, groups),
+        attempts=attempts,
         extinction_time=clock[:, EXTINCT],
         distribution=[rows for g in groups for rows in g.distribution]
         if plan.distribution
         else None,
         balance=(inside, come, gone) if plan.model.open else None,
         attributes=_attributes(plan, groups),
-        warnings=_warnings(plan, groups, int(missing.any(axis=1).sum())),
+        warnings=Totals.of(groups, attempts).warnings(plan),
     )
-
-
-def _attempts(plan: Plan, groups: Sequence[Group | Divided]) -> Float:
-    """Candidates for each process, of shape (R, P).
-
-    Which process an encounter belongs to is decided last: its candidates are shared among the
-    processes of pairs in the ratio of their events.
-    """
-    found = np.concatenate([g.state.attempts for g in groups]).astype(float)
-    pairs = sum(isinstance(process, PairProcess) for process in plan.model.processes)
-    alone = pairs + sum(isinstance(process, LoneProcess) for process in plan.model.processes)
-    if pairs:
-        trials = np.concatenate([g.state.count[:, TRIALS] for g in groups])
-        events = np.concatenate([g.state.events[:, :pairs] for g in groups]).astype(float)
-        total = events.sum(axis=1, keepdims=True)
-        share = np.divide(events, total, out=np.full(events.shape, 1 / pairs), where=total > 0)
-        found[:, :pairs] = share * (trials - found[:, pairs:alone].sum(axis=1))[:, None]
-    return found
-
-
-def _rarely_accepted(plan: Plan, groups: Sequence[Group | Divided]) -> list[str]:
-    """Warn of processes for which nearly all candidates come to nothing."""
-    attempts = _attempts(plan, groups).sum(axis=0)
-    events = np.concatenate([g.state.events for g in groups]).sum(axis=0)
-    found = []
-    for process, tried, done in zip(plan.model.processes, attempts, events, strict=True):
-        # after every event of any kind a candidate for an encounter is drawn afresh
-        each = events.sum() if isinstance(process, PairProcess) else done
-        if tried >= _MANY and each < _RARE * tried:
-            cure = (
-                "another method, or 'auto', may be much faster"
-                if isinstance(process, PairProcess)
-                else "its rate differs much among sizes or splits that are nearly the same"
-            )
-            found.append(
-                f"{process.name}: {tried:.3g} candidates for {done} events, fewer than 1 in "
-                f"{1 / _RARE:g}; the result is right, but took long: {cure}"
-            )
-    return found
 
 
 def _number_density(
@@ -184,65 +128,3 @@ def _attributes(plan: Plan, groups: Sequence[Group | Divided]) -> dict[str, obje
         "compile_seconds": max(g.compile_seconds for g in groups),
         "complete": all(g.done for g in groups),
     }
-
-
-def _lacking(missed: float, events: int) -> str:
-    """Say how many events did not take place, by the estimate of `smolux.core.loop.repair`."""
-    share = missed / max(events + missed, 1.0)
-    return f"an estimated {missed:.3g} of its events, {share:.2g} of all, did not take place"
-
-
-def _broken_bounds(plan: Plan, groups: Sequence[Group | Divided]) -> list[str]:
-    """Say which bounds did not hold, and how many events did not take place before a repair."""
-    count = np.concatenate([g.state.count for g in groups])
-    clock = np.concatenate([g.state.clock for g in groups])
-    missed = np.concatenate([g.state.missed for g in groups]).sum(axis=0)
-    events = np.concatenate([g.state.events for g in groups]).sum(axis=0)
-    found = []
-    repairs = int(count[:, REPAIRS].sum())
-    if repairs:
-        i, j = count[clock[:, FLOOR].argmax(), [WORST_I, WORST_J]]
-        lacking = _lacking(missed[BY_KERNEL], int(count[:, EVENTS].sum()))
-        found.append(
-            f"the kernel was found above its bound {repairs} times in {count[:, TRIALS].sum()} "
-            f"candidates, for example at the sizes {i} and {j}: {lacking}, give or take "
-            f"{1.0 / np.sqrt(repairs):.0%} of that, before the bound was raised, besides what no "
-            "candidate has met. A kernel written as a formula, or bounds= of from_function that "
-            "hold, have no such error"
-        )
-    splits = [isinstance(p, LoneProcess) and p.splits for p in plan.model.processes]
-    cure = "A formula in i and j has proved bounds; of a function, from_function takes them"
-    name = f"fragmentation, for a size above {EXACT},"
-    _add(found, name, clock[:, RAISED], missed[BY_SPLITS], events[splits].sum(), cure)
-    cure = "A formula in t has proved bounds; of a function, smolux.law states them"
-    for k, process in enumerate(plan.model.processes):
-        name = f"{process.name}, {process.factor.text},"
-        _add(found, name, clock[:, CLOCKS + k], missed[BY_FACTOR + k], events[k], cure)
-    return found
-
-
-def _add(found: list[str], name: str, raised: Float, missed: float, events: int, cure: str) -> None:
-    """Add a warning if the bound of a rate was `raised` in one of the replicas."""
-    replicas = int((raised > 0.0).sum())
-    if replicas:
-        found.append(
-            f"the rate of {name} was found above its sampled bound in {replicas} of {len(raised)} "
-            f"replicas: {_lacking(missed, int(events))} before the bound was raised, besides what "
-            f"no candidate has met. {cure}"
-        )
-
-
-def _warnings(plan: Plan, groups: Sequence[Group | Divided], unfinished: int) -> list[str]:
-    clock = np.concatenate([g.state.clock for g in groups])
-    found = [*plan.model.initial.remarks, *_broken_bounds(plan, groups)]
-    found += _rarely_accepted(plan, groups)
-    extinct = clock[:, EXTINCT]
-    ended = int(np.isfinite(extinct).sum())
-    if ended:
-        found.append(
-            f"{ended} of {len(extinct)} replicas ended as one cluster (extinction), the first at "
-            f"t = {np.nanmin(extinct):.6g}: more particles, or population='doubling', put this off"
-        )
-    if unfinished:
-        found.append(f"{unfinished} replicas did not reach the last output time")
-    return found

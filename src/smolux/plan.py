@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .assembly import inflow, rates_for
+from .assembly import rates_for
 from .checks import is_number, numbers, orders_of_moments, whole
 from .content import frozen
 from .core.state import Grid
@@ -29,6 +29,7 @@ from .resources import available_memory
 from .weighting import WEIGHTINGS
 from .weighting.auto import Auto as AutoWeighting
 from .weighting.base import Weighting
+from .windows import inflow
 
 #: particles that a sub-volume has at least: with less, fewer sub-volumes are used
 LEAST = 1000

@@ -11,14 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import room
-from .assembly import (
-    bound_splits,
-    factor_parameters,
-    loop_for,
-    rates_for,
-    uncompilable,
-    windows_for,
-)
+from .assembly import bound_splits, factor_parameters, loop_for, rates_for, uncompilable
 from .core.compile import CompileError
 from .core.rng import streams
 from .core.state import (
@@ -64,6 +57,7 @@ from .model import Model
 from .plan import Plan
 from .processes.base import LoneProcess
 from .remembered import spent
+from .windows import windows_for
 
 Int = NDArray[np.int64]
 
@@ -298,7 +292,7 @@ class Group:
         # for this replica alone: what others do must not depend on when this one came here
         clock, known = self.state.clock[r], float(self.windows.bounds[window, process])
         bound = known + clock[CLOCKS + process]
-        if bound > 0.0:  # see `smolux.core.loop.repair`
+        if bound > 0.0:  # see `smolux.core.bounds.repair`
             self.state.missed[r, BY_FACTOR + process] += value / bound - 1.0
         clock[CLOCKS + process] = 1.1 * value - known
         clock[EXCESS] = clock[CLOCKS:].sum()

@@ -362,10 +362,31 @@ def test_particles_that_never_meet(method: str) -> None:
     ds = simulated(model, TIMES, 51, method=method)
     laws.agree(ds["number_density"].values, np.exp(-0.3 * np.array(TIMES)), method)
     assert (ds["collisions"] == 0).all()
+    _in_few_candidates(ds)
     model = replace(everything(source=1.0, initial=sx.initial.empty()), kernel=laws_of_all)
     ds = simulated(model, [3.0], 52, method=method)
     brought = 3.0 + 0.5 * (1 - np.cos(9.0)) / 3
     laws.agree(ds["number_density"].values[:, 0], 1.2 * brought, method)
+
+
+def _in_few_candidates(ds: Any) -> None:
+    """Where the others took thousands for each event, as they waited for an encounter."""
+    others = ds["events"].isel(time=-1, process=slice(1, None)).sum("process")
+    assert (others > 100).all()
+    assert (ds["attempts"].isel(process=0) < 8 * 4096).all()
+
+
+@laborious
+def test_encounters_that_are_seldom_hold_nothing_up() -> None:
+    """One in a thousand candidates has the giant in it, and few come in the time of the others."""
+    giant = sx.initial.from_sizes({1: 0.999, 10**6: 0.001})
+    kernel = sx.kernels.formula(FORMULA, c0=0.0, c1=1e-6, c2=0.0, c3=0.0)
+    model = replace(everything(removal=0.3, initial=giant), kernel=kernel)
+    ds = simulated(model, [1.0], 53, population="fixed-volume")
+    particles = ds["particles"].values[:, 0] + ds["collisions"].values[:, 0]
+    laws.agree(particles, 1000 * np.exp(-0.3), "removal")
+    laws.agree(ds["collisions"].values[:, 0], (1 - np.exp(-0.6)) / 0.6, "by the giant, while it is")
+    _in_few_candidates(ds)
 
 
 @pytest.mark.parametrize("kernel", ZEROS.values(), ids=ZEROS)

@@ -14,10 +14,10 @@ import pytest
 
 import smolux as sx
 from smolux import processes
-from smolux.assembly import windows_for
 from smolux.content import digest, frozen, is_frozen
 from smolux.core.compile import user_piece
 from smolux.plan import make_plan
+from smolux.windows import windows_for
 
 slow = pytest.mark.slow
 METHODS = [

@@ -218,3 +218,76 @@ def test_mistakes_are_told_together():
         sx.efficiency(MODEL, [], times=[1.0])
     with pytest.raises(InputError, match=r"(?s)threads = 0.*schemes"):
         sx.efficiency(MODEL, schemes=[("inverse",)], times=[1.0], threads=0)
+
+
+# --- warnings, and what is kept of a run that ends early ------------------------------------------
+
+
+SMALL: dict[str, Any] = {"population": "fixed-volume", "particles": 20, "seed": 3}
+
+
+def test_warnings_are_those_of_simulate():
+    given = {"method": METHOD, "weighting": power(0.0), "replicas": 300, **SMALL}
+    with pytest.warns(sx.SmoluxWarning, match="ended as one cluster") as issued:
+        ds = sx.ensemble(MODEL, [40.0], ("M2",), **given)
+    assert [str(each.message) for each in issued] == sx.results.warnings(ds)
+    with pytest.warns(sx.SmoluxWarning):
+        rows = sx.simulate(MODEL, [40.0], **given)
+    assert sx.results.warnings(ds) == sx.results.warnings(rows)
+    assert ds.attrs["complete"]
+
+
+@extinction
+def test_warnings_of_schemes_name_them():
+    ds = sx.efficiency(
+        MODEL, [METHOD], [power(0.0), power(1.0)], ["M2"], times=[40.0], replicas=100, **SMALL
+    )
+    (text,) = sx.results.warnings(ds)  # with mass flow one particle is never alone
+    assert text.startswith(f"{METHOD}, weight-function=0: 64 of 100 replicas ended")
+
+
+@pytest.mark.parametrize(
+    ("error", "raised"),
+    [
+        (InputError("a rate is none"), InputError),
+        (MemoryError(), sx.errors.OutOfMemoryError),
+        (KeyboardInterrupt(), sx.Interrupted),
+    ],
+    ids=["rate", "memory", "ctrl-c"],
+)
+def test_what_was_computed_is_kept(
+    monkeypatch: pytest.MonkeyPatch, error: BaseException, raised: type
+):
+    """The third turn does not end: the statistics are those of the two before it."""
+    run = Sampler.batch
+    step = 5  # 100 replicas in twenty batches
+
+    def batch(self: Sampler, first: int, count: int, stop: Any) -> Any:
+        if first >= 2 * step:
+            raise error
+        return run(self, first, count, stop)
+
+    given = {"times": [1.0], "observables": ("M2",), "replicas": 100, "threads": 1, **SMALL}
+    one = {"method": METHOD, "weighting": power(0.0)}
+    both = {"methods": [METHOD], "weightings": [power(0.0), power(1.0)]}
+    for entry, schemes in ((sx.ensemble, one), (sx.efficiency, both)):
+        with monkeypatch.context() as patch:
+            patch.setattr(Sampler, "batch", batch)
+            with pytest.raises(raised) as caught:
+                entry(MODEL, **given, **schemes)
+        ds = caught.value.dataset
+        assert not ds.attrs["complete"]
+        assert ds.attrs["replicas"] == 2 * step
+        assert "statistics of 10 of 100 replicas" in sx.results.warnings(ds)
+        rows = sx.ensemble(MODEL, **(given | {"replicas": 2 * step}), **one)
+        np.testing.assert_allclose(ds["mean"].values.ravel()[0], rows["mean"].values[0, 0])
+
+
+def test_nothing_computed_is_no_dataset(monkeypatch: pytest.MonkeyPatch):
+    def batch(self: Sampler, *_: Any) -> Any:
+        raise InputError("a rate is none")
+
+    monkeypatch.setattr(Sampler, "batch", batch)
+    with pytest.raises(InputError, match="a rate is none") as caught:
+        sx.ensemble(MODEL, [1.0], method=METHOD, weighting=power(0.0), replicas=100, **SMALL)
+    assert caught.value.dataset is None

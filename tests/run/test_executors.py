@@ -195,11 +195,12 @@ def test_ctrl_c_keeps_what_came_back(expected: Any) -> None:
     np.testing.assert_array_equal(ds["n"].values[came], expected["n"].values[came])
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="the error is put into forked processes")
-@pytest.mark.parametrize("kind", [InputError, MemoryError])
-def test_a_late_error_keeps_what_others_computed(kind: Any, monkeypatch: Any) -> None:
-    serve, given = replicas.Group._serve, {"particles": 20_000, "replicas": 4}
-    expected = simulate(**given)
+LARGE: dict[str, Any] = {"particles": 20_000, "replicas": 4}
+
+
+def raise_late(monkeypatch: pytest.MonkeyPatch, kind: Any) -> None:
+    """Let all groups but the first come upon an error late in their run."""
+    serve = replicas.Group._serve
 
     def late(group: Any) -> None:
         serve(group)
@@ -207,16 +208,27 @@ def test_a_late_error_keeps_what_others_computed(kind: Any, monkeypatch: Any) ->
             raise kind("a rate is nan; it must be a finite number")
 
     monkeypatch.setattr(replicas.Group, "_serve", late)
-    with ProcessPoolExecutor(2, get_context("fork")) as pool, pytest.raises(InputError) as caught:
-        simulate(executor=pool, **given)
-    assert ("finite number" if kind is InputError else "memory") in str(caught.value)
-    ds: Any = caught.value.dataset
+
+
+def keeps_what_there_is(error: InputError, expected: Any) -> None:
+    ds: Any = error.dataset
     assert not ds.attrs["complete"]
-    assert caught.value.problems[0] in ds.attrs["warnings"]
+    assert error.problems[0] in ds.attrs["warnings"]
     whole = np.isfinite(ds["n"].values).all(axis=(1, 2))
     assert whole[0]
     assert not whole[-1]
     np.testing.assert_array_equal(ds["n"].values[whole], expected["n"].values[whole])
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the error is put into forked processes")
+@pytest.mark.parametrize("kind", [InputError, MemoryError])
+def test_a_late_error_keeps_what_others_computed(kind: Any, monkeypatch: Any) -> None:
+    expected = simulate(**LARGE)
+    raise_late(monkeypatch, kind)
+    with ProcessPoolExecutor(2, get_context("fork")) as pool, pytest.raises(InputError) as caught:
+        simulate(executor=pool, **LARGE)
+    assert ("finite number" if kind is InputError else "memory") in str(caught.value)
+    keeps_what_there_is(caught.value, expected)
 
 
 def test_workers_that_die_leave_what_others_computed(expected: Any, monkeypatch: Any) -> None:
@@ -278,6 +290,22 @@ def test_dask(processes: bool, expected: Any) -> None:
             assert expected.equals(simulate(executor=pool))
             goal = {"replicas": 8, "target_error": 0.15}
             assert simulate(**goal).equals(simulate(executor=pool, **goal))
+
+
+@pytest.mark.parametrize("kind", [InputError, MemoryError])
+def test_a_late_error_on_dask_keeps_what_others_computed(kind: Any, monkeypatch: Any) -> None:
+    distributed = pytest.importorskip("distributed")
+    expected = simulate(**LARGE)
+    raise_late(monkeypatch, kind)
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+        pytest.raises(InputError) as caught,
+    ):
+        simulate(executor=client, **LARGE)
+    keeps_what_there_is(caught.value, expected)
 
 
 def test_a_dask_worker_that_dies(

@@ -135,6 +135,16 @@ def test_bounds_that_do_not_hold_are_repaired(method: str, bounds: Any) -> None:
     assert abs(a - b) < 0.5 * (plain - b) + 1e-12
 
 
+def test_a_size_that_breaks_one_bound_is_tried_with_all_classes() -> None:
+    """Bounds of each pair of classes fail by themselves; one by one that took 4 to 9 repairs."""
+    plan = runs.plan(model(8.0, below_one), [30.0], "size-class", particles=2000)
+    group = Group.start(plan, 0, 20)
+    group.advance(lambda: False)
+    repairs = group.state.count[:, REPAIRS]
+    assert repairs.min() >= 1
+    assert repairs.max() <= 3
+
+
 @every_method
 def test_what_one_replica_repairs_changes_no_other(method: str) -> None:
     plan = runs.plan(model(8.0, one), [30.0], SETTINGS.get(method, method), particles=2000)

@@ -8,7 +8,7 @@ import pytest
 import smolux as sx
 import smolux.spatial as sp
 from smolux import resources, room
-from smolux.spatial import running
+from smolux.spatial import running, time_stepping, windowed
 
 FINE = {"position": [[1, 1], [3, 1]], "velocity": [[1, 0], [0, 1]], "radius": 0.5, "box": 4}
 
@@ -197,3 +197,23 @@ def test_the_clock_and_the_memory_stop_a_run(why, monkeypatch):
     assert 1 <= cut["events"].sizes["event"] <= 20
     whole, done = sp.simulate(s), sp.resume(cut)
     np.testing.assert_array_equal(done["events"]["first"], whole["events"]["first"])
+
+
+@pytest.mark.parametrize("full", ["_PAIRS", "_EVENTS", "time-stepping"])
+def test_lists_that_would_outgrow_the_memory_stop_a_run(full, monkeypatch):
+    """Only lists of discs are asked for here: they begin too short."""
+    s, given = sp.lattice(2025, 0.2, seed=3), {}
+    if full == "time-stepping":
+        monkeypatch.setattr(time_stepping, "_PAIRS", 0)
+        given = {"method": sp.TimeStepping(step=0.5), "times": [1.0], "until": 1.0}
+    else:
+        monkeypatch.setattr(windowed, full, 0)
+        monkeypatch.setattr(windowed, "_THIN", 2.0)
+    monkeypatch.setattr(room, "_SMALL", 1)
+    monkeypatch.setattr(running, "_EVENT", 0)
+    monkeypatch.setattr(resources, "free_memory", lambda: 0.0)
+    with pytest.warns(sx.SmoluxWarning, match="memory: lists of discs that may meet need "):
+        cut = sp.simulate(s, **given)
+    assert not cut.attrs["complete"]
+    monkeypatch.setattr(resources, "free_memory", lambda: None)
+    assert sp.simulate(s, **given).attrs["complete"]

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import smolux as sx
-from smolux.assembly import windows_for
 from smolux.callables import numbers_of
 from smolux.errors import InputError
 from smolux.intervals import Interval
@@ -21,6 +20,7 @@ from smolux.model_dict import model_from_dict, model_to_dict
 from smolux.processes import Aggregation, Removal, Shattering
 from smolux.sizefunction import SizeFunction
 from smolux.timefunction import TimeFunction
+from smolux.windows import windows_for
 
 HOURS = np.array([0.0, 7.0, 7.01, 7.02, 100.0])
 FLOW = np.array([0.5, 0.0, 50.0, 0.0, 2.0])

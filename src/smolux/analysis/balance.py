@@ -6,6 +6,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from smolux.results import require
+
 Float = NDArray[np.float64]
 
 #: what the sums of a run are off by, of the mass
@@ -26,6 +28,7 @@ def mass_balance(ds: xr.Dataset) -> str:
         Means over the replicas, per volume; how far off, the worst of all replicas and times. Empty
         if the mass was not observed.
     """
+    require(ds, "time")
     columns = _columns(ds)
     if columns is None:
         return ""

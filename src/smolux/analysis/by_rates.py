@@ -18,6 +18,7 @@ from smolux.checks import numbers, whole
 from smolux.errors import InputError, warn
 from smolux.kernels.base import Kernel
 from smolux.model import Model
+from smolux.results import require
 from smolux.weighting import MassFlow, Number, WeightFunction
 from smolux.weighting.base import Weighting
 
@@ -85,6 +86,7 @@ def densities_by_rates(ds: xr.Dataset, sizes: ArrayLike, model: Model | None = N
     >>> bool(better.std() < ds.n.sel(time=20, size=50).std() / 3)
     True
     """
+    require(ds, "time", "n", "volume", source="simulate")
     wanted, found, weighting = _checked(ds, sizes, model)
     times = ds["time"].values
     n, volume = ds["n"].transpose("replica", "time", "size").values, ds["volume"].values

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from smolux.errors import InputError
+from smolux.results import require
 
 from .reference import exact_dataset, is_deterministic
 from .select import matches
@@ -173,6 +174,14 @@ def compare(first: xr.Dataset, second: xr.Dataset | Literal["exact"]) -> xr.Data
     InputError
         If the results have no time in common, or no exact solution is known.
     """
+    require(first, "time", what="first")
+    if not isinstance(second, str):
+        require(second, "time", what="second")
+    elif second != "exact":
+        raise InputError(
+            f"second = {second!r}: must be a result or 'exact'; read a file with "
+            "smolux.results.load"
+        )
     reference = exact_dataset(first) if isinstance(second, str) else second
     if reference is None:
         raise InputError("compare: no exact solution is known for the model of this result")

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from smolux.errors import InputError
-from smolux.results import warnings
+from smolux.results import require, warnings
 
 from .statistics import over_replicas, quantile
 from .table import aligned
@@ -153,6 +153,7 @@ def sweep_table(ds: xr.Dataset) -> tuple[list[str], list[list[str]]]:
     InputError
         If it is no sweep.
     """
+    require(ds, "time", source="sweep")
     if "sweep" not in ds.attrs:
         raise InputError("ds: is no result of smolux.sweep")
     keys = list(json.loads(ds.attrs["sweep"]))

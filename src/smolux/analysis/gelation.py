@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from smolux.errors import InputError
+from smolux.results import require
 
 from .reference import is_deterministic
 from .statistics import over_replicas
@@ -30,6 +31,7 @@ def gel_fraction(ds: xr.Dataset) -> xr.DataArray:
     -------
     xarray.DataArray of shape (replica, time)
     """
+    require(ds, "moment", "order", "time", "replica")
     mass = ds["moment"].sel(order=1.0, drop=True).transpose("replica", "time")
     if is_deterministic(ds):
         share = 1 - mass / mass.isel(time=0)
@@ -116,6 +118,7 @@ def gelation(ds: xr.Dataset) -> xr.Dataset:
     ----------
     D. J. Aldous, Bernoulli 5, 3 (1999), doi:10.2307/3318611.
     """
+    require(ds, "moment", "order", "time", "replica")
     missing = [p for p in (1.0, 2.0) if p not in ds["order"].values]
     if missing:
         raise InputError(

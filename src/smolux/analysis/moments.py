@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import xarray as xr
 
 from smolux.checks import orders_of_moments
+from smolux.results import require
 
 
 def moments(ds: xr.Dataset, orders: Sequence[float] = (0, 1, 2, 3)) -> xr.Dataset:
@@ -29,6 +30,7 @@ def moments(ds: xr.Dataset, orders: Sequence[float] = (0, 1, 2, 3)) -> xr.Datase
         The variables moment, lower and upper with the dimensions of n, ``order`` in place of
         ``size``. The estimate puts all clusters of a bin at its geometric centre.
     """
+    require(ds, "n", "size")
     powers = orders_of_moments(orders)
     p = xr.DataArray(powers, dims="order", coords={"order": powers})
     exact = (ds["n"] * ds["size"].astype(float) ** p).sum("size", skipna=False)

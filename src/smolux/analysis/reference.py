@@ -11,6 +11,7 @@ import xarray as xr
 from smolux import exact
 from smolux.model import Model
 from smolux.model_dict import model_from_dict
+from smolux.results import require
 
 if TYPE_CHECKING:
     from smolux.exact.base import Solution
@@ -27,6 +28,7 @@ def model_of(ds: xr.Dataset) -> Model | None:
     -------
     Model or None
     """
+    require(ds)
     try:
         return model_from_dict(json.loads(ds.attrs["model"]))
     except (KeyError, TypeError, ValueError):
@@ -62,6 +64,7 @@ def exact_dataset(ds: xr.Dataset) -> xr.Dataset | None:
     xarray.Dataset or None
         With number_density, moment and n, without the dimension replica.
     """
+    require(ds, "time", "order", "size")
     solution = solution_of(ds)
     if solution is None:
         return None

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from smolux.results import require
+
 from .statistics import over_replicas
 
 
@@ -20,6 +22,7 @@ def mean_size(ds: xr.Dataset) -> xr.DataArray:
     -------
     xarray.DataArray over time
     """
+    require(ds, "moment", "order")
     moment = ds["moment"].mean("replica") if "replica" in ds["moment"].dims else ds["moment"]
     s = moment.sel(order=2.0, drop=True) / moment.sel(order=1.0, drop=True)
     return s.rename("mean_size").assign_attrs(long_name="mean size M2/M1", units="1")
@@ -49,6 +52,7 @@ def scaling(ds: xr.Dataset) -> xr.Dataset:
     S. K. Friedlander and C. S. Wang, J. Colloid Interface Sci. 22, 126 (1966),
     doi:10.1016/0021-9797(66)90073-7.
     """
+    require(ds, "n", "n_bin", "moment", "order", "time")
     n = ds["n"].transpose("replica", "time", "size").values
     width = ds["bin_width"].values
     with np.errstate(invalid="ignore", divide="ignore"):

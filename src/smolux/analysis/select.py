@@ -7,6 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from smolux.errors import InputError, did_you_mean
+from smolux.results import require
 
 Float = NDArray[np.float64]
 
@@ -40,6 +41,7 @@ def series(
     InputError
         If there is no such variable, order, size or process.
     """
+    require(ds, "time")
     known = [str(name) for name, v in ds.data_vars.items() if "time" in v.dims]
     if variable not in known:
         raise InputError(

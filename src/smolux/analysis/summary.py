@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from smolux.errors import InputError
+from smolux.results import require
 
 from .balance import mass_balance
 from .reference import exact_dataset, is_deterministic
@@ -133,11 +134,7 @@ def summary(ds: xr.Dataset, sizes: Sequence[int] = (1, 2, 5, 10, 20, 50, 100)) -
     --------
     >>> smolux.summary(ds)["moment"].sel(order=2, statistic="mean")  # doctest: +SKIP
     """
-    missing = [name for name in ("number_density", "moment", "n") if name not in ds]
-    if missing or "replica" not in ds.dims:
-        raise InputError(
-            f"ds: is no result of simulate or solve, it has no {', '.join(missing) or 'replica'}"
-        )
+    require(ds, "number_density", "moment", "n", "replica")
     if "sweep" in ds.attrs and "point_status" in ds and ds["point_status"].dims:
         place = {str(d): ds[d].values[0].item() for d in ds["point_status"].dims}
         raise InputError(f"ds: is a sweep; choose a point, such as ds.sel({place})")

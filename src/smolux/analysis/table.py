@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from smolux.errors import InputError, did_you_mean
+from smolux.results import require
 
 
 def _number(value: float, digits: int) -> str:
@@ -85,6 +86,7 @@ def tables(
     InputError
         If there is no such variable.
     """
+    require(summary, what="summary", source="smolux.summary")
     if "statistic" not in summary.dims:
         raise InputError("summary: make it with smolux.summary(ds) first")
     known = [str(name) for name in summary.data_vars]

@@ -189,13 +189,17 @@ def run(case: Case, methods: Sequence[str] | None, figure: Path | None) -> bool:
     Raises
     ------
     InputError
-        If the case has no table ``[run]``, or a method is unknown.
+        If the case has no table ``[run]``, a method is unknown, or the figure cannot be written.
     """
     if case.run is None:
         raise InputError("compare: the case has no table [run], so there is nothing to simulate")
     seeded = case.with_seed()
     assert seeded.run is not None
     chosen = choose(methods)
+    if figure is not None:
+        from ..plotting.style import kind_of
+
+        kind_of(figure)  # before all that would be lost
     console.say(f"seed {seeded.run.seed}")
     found = compute(seeded, chosen)
     if not found:

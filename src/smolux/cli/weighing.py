@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+from .. import ensembles
 from ..case import Case
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, Interrupted, did_you_mean
 from ..weighting import WEIGHTINGS, WeightFunction
 from ..weighting.base import Weighting
 from . import console
@@ -54,7 +56,8 @@ def run(
     Raises
     ------
     InputError
-        If the case has no table ``[run]``, or a method, weighting or observable is unknown.
+        If the case has no table ``[run]``, a method, weighting or observable is unknown, or the
+        figure cannot be written.
     """
     if case.run is None:
         raise InputError("efficiency: the case has no table [run], so there is nothing to simulate")
@@ -62,29 +65,44 @@ def run(
     settings = seeded.run
     assert settings is not None
     chosen = weightings_of(weightings or ("number", "mass-flow"))
-    from .. import ensembles
+    if figure is not None:
+        from ..plotting.style import kind_of
 
+        kind_of(figure)  # before all that would be lost
     console.say(
         f"seed {settings.seed}, {settings.replicas:,} replicas of {settings.particles:,} particles"
     )
-    ds = ensembles.efficiency(
-        seeded.model,
-        list(methods or [settings.method]),
-        chosen,
-        list(observables or dict.fromkeys([settings.target, "M2"])),
-        times=settings.times,
-        population=settings.population,
-        particles=settings.particles,
-        replicas=settings.replicas,
-        seed=settings.seed,
-    )
-    print(ensembles.efficiency_table(ds))
-    print(
-        f"Bias against: {ds.attrs['reference']}. Efficiency: 1 / (cost variance), over that of "
-        "the first row as ratio. Times are processor seconds without compilation."
-    )
+    try:
+        ds = ensembles.efficiency(
+            seeded.model,
+            list(methods or [settings.method]),
+            chosen,
+            list(observables or dict.fromkeys([settings.target, "M2"])),
+            times=settings.times,
+            population=settings.population,
+            particles=settings.particles,
+            replicas=settings.replicas,
+            seed=settings.seed,
+        )
+    except (InputError, Interrupted) as early:
+        if early.dataset is not None:
+            _print(early.dataset)
+        if isinstance(early, Interrupted):  # there is nothing to go on from
+            raise KeyboardInterrupt from None
+        raise
+    _print(ds)
     if figure is not None:
         from .. import plotting
 
         plotting.save(plotting.efficiency(ds), figure)
         print(f"{figure} written")
+
+
+def _print(ds: Any) -> None:
+    print(ensembles.efficiency_table(ds))
+    print(
+        f"Bias against: {ds.attrs['reference']}. Efficiency: 1 / (cost variance), over that of "
+        "the first row as ratio. Times are processor seconds without compilation."
+    )
+    if not ds.attrs["complete"]:
+        console.say(f"statistics of {ds.attrs['replicas']:,} replicas")

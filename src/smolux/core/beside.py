@@ -7,6 +7,11 @@ which changes nothing, as waiting times have no memory.
 - Single particles, see `smolux.core.lone`.
 - Sources, each at a constant rate for a unit of volume.
 
+The encounter is drawn first: it is the most frequent event. Where many candidates for it have been
+looked at and something else came before, it is drawn last, and its candidates are looked at no
+further than the earliest of the others, whose times they have no influence on. So a kernel that is
+zero for all that is there, or a particle that only meets itself, does not hold the others up.
+
 Time-dependent factors are bounded in windows and thinned when the event comes, as for encounters.
 """
 
@@ -18,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from . import rng
+from .bounds import thinned
 from .compile import cold_piece, piece
-from .loop import make_choose_process, schedule, thinned
+from .loop import make_choose_process, schedule
 from .state import (
     BAD_FACTOR,
     BAD_RATE,
@@ -33,6 +39,7 @@ from .state import (
     IN_DOUBT,
     KIND,
     LARGEST,
+    LATE,
     LIMIT,
     LONE,
     LONE_PART,
@@ -48,12 +55,15 @@ from .state import (
     SPLITS,
     TIME,
     TOO_LARGE,
+    TRIALS,
     VOLUME,
     WANTED,
     WINDOW,
 )
 
 PAIR, ALONE, SOURCE = 0, 1, 2
+#: candidates for an encounter in vain after which encounters are drawn last
+_MANY = 256
 
 
 def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lones: int,
@@ -74,24 +84,17 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
         return total * s.clock[VOLUME]
 
     @piece
-    def next_event(s, w, windows, p, q, until, stop):
-        window = s.count[WINDOW]
-        s.count[KIND] = PAIR
-        s.count[FIRST] = -1
-        if lones > 0:
-            reason = ready(s, w, p, q.lone)
-            if reason != 0:
-                return reason
-        s.missed[IN_DOUBT] = s.missed[SPLIT_IN_DOUBT] = 0.0
-        wait = math.inf
-        if pairs > 0:
-            total = windows.total[window]
-            for r in range(pairs):
-                total += s.clock[CLOCKS + r]
-            if total > 0.0:
-                wait = draw(s, w, p, total)
-            if math.isnan(wait):
-                return BAD_RATE
+    def encounter(s, w, windows, p, limit):
+        """Draw the next encounter; return its waiting time, infinite if there is none."""
+        total = windows.total[s.count[WINDOW]]
+        for r in range(pairs):
+            total += s.clock[CLOCKS + r]
+        return draw(s, w, p, total, limit) if pairs > 0 and total > 0.0 else math.inf
+
+    @cold_piece
+    def other(s, w, windows, q, limit):
+        """Draw what else comes first, return its waiting time; the limit if nothing does."""
+        wait = limit
         if sources > 0:
             rate = source_rate(s, windows)
             if rate > 0.0:
@@ -102,12 +105,41 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
         if lones > 0:
             alone = lone(s, w, windows, q.lone, wait)
             if math.isnan(alone):
-                return BAD_RATE
+                return math.nan
             if alone < wait:
                 wait = alone
                 s.count[KIND] = ALONE
-                seize(s, w, s.count[LONE])
-        schedule(s, windows, wait)
+        return wait
+
+    @piece
+    def next_event(s, w, windows, p, q, until, stop):
+        s.count[KIND] = PAIR
+        s.count[FIRST] = -1
+        if lones > 0:
+            reason = ready(s, w, p, q.lone)
+            if reason != 0:
+                return reason
+        s.missed[IN_DOUBT] = s.missed[SPLIT_IN_DOUBT] = 0.0
+        late, first, limit = s.count[LATE] == 1, math.inf, math.inf
+        if late:
+            first = other(s, w, windows, q, math.inf)
+            limit = min(first, windows.edges[s.count[WINDOW] + 1] - s.clock[TIME])
+        before = s.count[TRIALS]
+        wait = encounter(s, w, windows, p, limit)
+        looked = s.count[TRIALS] - before
+        if not late:
+            first = other(s, w, windows, q, wait)
+        if math.isnan(wait) or math.isnan(first):
+            return BAD_RATE
+        if wait < first:
+            s.count[KIND] = PAIR
+        if s.count[KIND] == PAIR and s.count[FIRST] >= 0:
+            s.count[LATE] = 0
+        elif looked > _MANY:
+            s.count[LATE] = 1
+        if lones > 0 and s.count[KIND] == ALONE:
+            seize(s, w, s.count[LONE])
+        schedule(s, windows, min(wait, first))
         return 0
 
     return next_event

@@ -50,7 +50,7 @@ class Burst(NamedTuple):
         How many events `Pieces.prepare` will find nothing to do for, if they are plain.
     hold : ``hold(s, w, factor)``
         Take what changes out of the state; the rates are `factor` times those of the kernel.
-    find : ``find(s, w, p, factor, held, particles, trials, *words)``
+    find : ``find(s, w, p, factor, limit, held, particles, trials, *words)``
         As `Pieces.draw`: the waiting time, the slots of the pair (-1: nothing happens then) and
         its sizes, the candidates looked at so far and the four words of the random generator.
     replace : ``replace(w, held, first, second, gone, size, count)``
@@ -72,10 +72,10 @@ def make_draw_one(find: Callable[..., Any]) -> Callable[..., Any]:
     """Bind the drawing of one event by `Burst.find`, for `Pieces.draw`."""
 
     @piece
-    def draw_one(s, w, p, factor, held):
+    def draw_one(s, w, p, factor, limit, held):
         a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
         wait, s.count[FIRST], s.count[SECOND], _, _, s.count[TRIALS], a, b, c, d = find(
-            s, w, p, factor, held, s.count[PARTICLES], s.count[TRIALS], a, b, c, d
+            s, w, p, factor, limit, held, s.count[PARTICLES], s.count[TRIALS], a, b, c, d
         )
         s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
         return wait
@@ -130,7 +130,7 @@ def make_burst(
         last = events + left
         while events < last and trials + events < stop:
             wait, first, second, i, j, trials, a, b, c, d = find(
-                s, w, p, factor, held, n, trials, a, b, c, d
+                s, w, p, factor, math.inf, held, n, trials, a, b, c, d
             )
             if math.isnan(wait):
                 reason = BAD_RATE

@@ -20,6 +20,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from . import rng
+from .bounds import thinned
 from .burst import Burst
 from .compile import cold_piece, entry, piece
 from .record import make_record
@@ -29,7 +30,6 @@ from .state import (
     BUDGET,
     BY_KERNEL,
     CLOCKS,
-    CULPRIT,
     DONE,
     DOUBLE_AT,
     DOUBLINGS,
@@ -39,10 +39,8 @@ from .state import (
     EXTINCT,
     FIRE,
     FIRST,
-    FLOOR,
     GROW,
     IN_DOUBT,
-    LARGEST,
     LIMIT,
     MASS_IN,
     MASS_OUT,
@@ -53,37 +51,18 @@ from .state import (
     PENDING,
     PHASE,
     PROCESS,
-    REPAIRS,
     SINCE,
     TIME,
     TOO_LARGE,
     TRIALS,
-    VALUE,
     VOLUME,
     WINDOW,
-    WORST_I,
-    WORST_J,
     State,
     Tally,
 )
 
 #: candidates looked at before the loop may return without an event
 PATIENCE = 4096
-#: what a value may be above its bound by rounding
-ROUNDING = 1.0 + 1e-12
-
-
-@piece
-def thinned(s, r, value, bound, share):
-    """Keep process `r` by its true factor, or none (-1); `share` is uniform below the bound of it.
-
-    A factor above its bound or without meaning is noted, and a number below -1 returned.
-    """
-    if not 0.0 <= value <= bound * ROUNDING:
-        s.clock[VALUE] = value
-        s.count[PROCESS] = r
-        return -2 if not 0.0 <= value < math.inf else -3
-    return r if share < value else -1
 
 
 @lru_cache(maxsize=64)
@@ -120,10 +99,11 @@ class Pieces(NamedTuple):
     ----------
     view : ``view(work, r)``
         The work arrays of replica `r`.
-    draw : ``draw(s, w, p, factor)``
+    draw : ``draw(s, w, p, factor, limit)``
         Choose the next pair into ``count[FIRST]``, ``count[SECOND]`` (-1: nothing happens then)
         and return the waiting time, the rate being `factor` times that of the kernel; NaN if a
-        rate of a pair that is present is none, which `note_bad` has noted.
+        rate of a pair that is present is none, which `note_bad` has noted. A method that looks at
+        candidates in turn stops at the first that would come after the `limit` and returns that.
     pair : ``pair(s, w)``
         Sizes of the chosen pair.
     update : ``update(s, w, gone, entries, p)``
@@ -196,7 +176,7 @@ def make_next_event(
         s.missed[IN_DOUBT] = 0.0
         wait = math.inf
         if total > 0.0:
-            wait = draw(s, w, p, total)
+            wait = draw(s, w, p, total, math.inf)
         if math.isnan(wait):
             return BAD_RATE
         schedule(s, windows, wait)
@@ -372,33 +352,3 @@ def make_loop(
             budget -= s.count[TRIALS] + s.count[EVENTS] - before
 
     return entry(loop)
-
-
-@cold_piece
-def repair(s, i, j, value, bound):
-    """Note a rate above its bound and raise the bound for the rest of the run.
-
-    Until then pairs of a rate K above their bound B were candidates at the rate c B and all
-    accepted, so that collisions were missing at the rate c (K - B). Each such collision that takes
-    place adds ``K/B - 1`` to the estimate of those missed. Its expectation is right, whatever sizes
-    came and went and whenever the bound was raised: what is counted at the rate c B with these
-    marks grows on average by the integral of ``c B (K/B - 1)``, which is what was missing.
-    """
-    s.missed[IN_DOUBT] = value / bound - 1.0
-    s.count[REPAIRS] += 1
-    s.count[WORST_I], s.count[WORST_J] = i, j
-    s.clock[FLOOR] = max(s.clock[FLOOR], 1.1 * value)
-
-
-@cold_piece
-def note_bad(s, i, j, value):
-    """Note a rate that is negative, infinite or undefined: the run cannot go on."""
-    s.count[WORST_I], s.count[WORST_J], s.count[CULPRIT] = i, j, 0
-    s.clock[VALUE] = value
-
-
-@piece
-def note_largest(s, size):
-    """Keep the bound of the sizes present above a new size."""
-    if size > s.count[LARGEST]:
-        s.count[LARGEST] = size

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import rng
+from .bounds import ROUNDING, note_bad
 from .compile import cold_piece, piece, user_piece
-from .loop import ROUNDING, note_bad
 from .slots import octave, slot_of, slot_top
 from .state import LONE_BITS, LONE_SLOTS, RAISED, SPLIT_IN_DOUBT, TRIALS
 

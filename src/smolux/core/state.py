@@ -35,7 +35,8 @@ LONE_PART = 24
 CULPRIT = 25  # whose rate is no rate: 0 the kernel, r + 1 process r of single particles
 WANTED = 26  # the size of which the splits are to be bounded
 VAIN = 27  # candidates of single particles in vain since all were counted
-COUNTS = 28
+LATE = 28  # 1: encounters are drawn after what else may come first, see `smolux.core.beside`
+COUNTS = 29
 
 # Entries of State.clock.
 TIME = 0  # of the latest event
@@ -102,7 +103,7 @@ class State(NamedTuple):
         Sums of ``held * most`` over the slots of an octave.
     missed : float64 array of shape (R, BY_FACTOR + P)
         Estimate of the events that did not take place as a bound did not hold, see
-        `smolux.core.loop.repair`.
+        `smolux.core.bounds.repair`.
     """
 
     rng: np.ndarray

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.assembly import rates_for, windows_for
+from smolux.assembly import rates_for
 from smolux.checks import whole
 from smolux.core.rng import streams
 from smolux.core.state import BUDGET, DONE, State
@@ -28,7 +28,9 @@ from smolux.observe import observable
 from smolux.pilot import settled
 from smolux.plan import Plan, make_plan
 from smolux.replicas import Group, empty_state, initial_populations
+from smolux.totals import Totals, attempts_of
 from smolux.weighting.base import Weighting
+from smolux.windows import windows_for
 
 from .moments import Moments
 
@@ -54,13 +56,13 @@ class Batch:
     ----------
     moments : Moments
         Of arrays of shape (observables, times).
-    collisions : int
+    totals : Totals
     seconds : float
         Processor seconds, all included: seeds, initial populations, events, statistics.
     """
 
     moments: Moments
-    collisions: int
+    totals: Totals
     seconds: float
 
 
@@ -143,7 +145,8 @@ class Sampler:
         begun = time.thread_time()
         group = self.start(first, count)
         moments = Moments.of(self.values(group, stop))
-        return Batch(moments, group.events, time.thread_time() - begun)
+        totals = Totals.of([group], attempts_of(self.plan, [group]))
+        return Batch(moments, totals, time.thread_time() - begun)
 
 
 def make_sampler(
@@ -219,39 +222,46 @@ def interleaved(
     replicas: int,
     workers: int,
     progress: Callable[[float], None] | None = None,
-) -> Iterator[tuple[int, Batch]]:
-    """Run the replicas of several samplers, a batch of each in turn; yield them in this order.
+) -> Iterator[tuple[Batch, ...]]:
+    """Run the replicas of several samplers in turns; yield the batches of a turn, one of each.
 
     The order, and so every sum over batches, does not depend on the number of threads.
     """
+    batches = _in_order(samplers, replicas, workers, progress)
+    return zip(*[batches] * len(samplers), strict=True)
+
+
+def _in_order(
+    samplers: Sequence[Sampler],
+    replicas: int,
+    workers: int,
+    progress: Callable[[float], None] | None,
+) -> Iterator[Batch]:
     tasks = (
-        (k, first, min(sampler.plan.replicas, replicas - first))
-        for first, k, sampler in _turns(samplers, replicas)
+        (sampler.batch, first, min(sampler.plan.replicas, replicas - first))
+        for first, sampler in _turns(samplers, replicas)
     )
-    halt, waiting = Event(), deque[tuple[int, int, Future[Batch]]]()
+    halt, waiting = Event(), deque[tuple[int, Future[Batch]]]()
     done, total = 0, replicas * len(samplers)
     with ThreadPoolExecutor(workers) as pool:
         try:
-            for k, first, count in tasks:
-                run = samplers[k].batch
-                waiting.append((k, count, pool.submit(run, first, count, halt.is_set)))
+            for run, first, count in tasks:
+                waiting.append((count, pool.submit(run, first, count, halt.is_set)))
                 if len(waiting) < 4 * workers:
                     continue
-                done += waiting[0][1]
-                yield waiting[0][0], waiting.popleft()[2].result()
+                done += waiting[0][0]
+                yield waiting.popleft()[1].result()
                 if progress is not None:
                     progress(done / total)
             while waiting:
-                k, _, future = waiting.popleft()
-                yield k, future.result()
+                yield waiting.popleft()[1].result()
         finally:
             halt.set()
-            for _, _, future in waiting:
+            for _, future in waiting:
                 future.cancel()
 
 
-def _turns(samplers: Sequence[Sampler], replicas: int) -> Iterator[tuple[int, int, Sampler]]:
-    step = samplers[0].plan.replicas
-    for first in range(0, replicas, step):
-        for k, sampler in enumerate(samplers):
-            yield first, k, sampler
+def _turns(samplers: Sequence[Sampler], replicas: int) -> Iterator[tuple[int, Sampler]]:
+    for first in range(0, replicas, samplers[0].plan.replicas):
+        for sampler in samplers:
+            yield first, sampler

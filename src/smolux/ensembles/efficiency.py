@@ -17,12 +17,12 @@ from smolux.deterministic.solver import solve
 from smolux.errors import InputError
 from smolux.methods.base import Method
 from smolux.model import Model
-from smolux.results import provenance
+from smolux.results import provenance, told
 from smolux.weighting import WeightFunction
 from smolux.weighting.base import Weighting
 
-from .batches import Sampler, interleaved, make_sampler
-from .ensemble import LONG_NAMES, Collected, checked_threads, described, labelled
+from .batches import Sampler, make_sampler
+from .ensemble import LONG_NAMES, Collected, checked_threads, collect, described, labelled
 
 Float = NDArray[np.float64]
 
@@ -96,8 +96,14 @@ def efficiency(
 
     Raises
     ------
-    InputError
-        With the mistakes in the arguments.
+    InputError, Interrupted
+        With the mistakes in the arguments; late in a run, and on Ctrl-C, as `ensemble` does, with
+        what is known of all schemes.
+
+    Warns
+    -----
+    SmoluxWarning
+        What `smolux.results.warnings` lists.
 
     Notes
     -----
@@ -138,9 +144,34 @@ def efficiency(
         )  # fmt: skip
     names = [observables] if isinstance(observables, str) else list(observables)
     reference, source = _reference(samplers[0], names, exact)
-    found = [Collected() for _ in samplers]
-    for k, batch in interleaved(samplers, int(replicas), workers, progress):
-        found[k].add(batch)
+    labels = [(_label(m), _label(w)) for m, w in pairs]
+
+    def dataset(found: list[Collected], *remarks: str) -> xr.Dataset:
+        given = described(samplers[0], found, int(replicas)) | {
+            "reference": source,
+            "methods": [s.plan.method.name for s in samplers],
+            "weightings": [_label(s.plan.weighting) for s in samplers],
+            "warnings": [*_warnings(samplers, found, labels), *remarks],
+        }
+        for one in ("method", "method_reason", "weighting", "weighting_reason"):
+            del given[one]
+        del given["weighting_settings"]
+        coordinates = {
+            "scheme": [", ".join(pair) for pair in labels],
+            "method": ("scheme", [m for m, _ in labels]),
+            "weighting": ("scheme", [w for _, w in labels]),
+            "observable": names,
+            "time": np.array(samplers[0].plan.times),
+        }
+        variables = _variables(found, reference)
+        ds = xr.Dataset(variables, coordinates, provenance("Efficiency of methods", given))
+        return labelled(ds, _LONG_NAMES)
+
+    return told(collect(samplers, int(replicas), workers, progress, dataset))
+
+
+def _variables(found: Sequence[Collected], reference: Float) -> dict[str, Any]:
+    """Return the variables of all schemes, side by side."""
     columns = [each.variables() for each in found]
     variables: dict[str, Any] = {
         name: (("scheme", *dims), np.array([column[name][1] for column in columns]))
@@ -148,24 +179,21 @@ def efficiency(
     }
     for name, values in (_compared(found) | _biased(found, reference)).items():
         variables[name] = (("scheme", "observable", "time"), values)
-    variables["reference"] = (("observable", "time"), reference)
-    labels = [(_label(m), _label(w)) for m, w in pairs]
-    coordinates = {
-        "scheme": [", ".join(pair) for pair in labels],
-        "method": ("scheme", [m for m, _ in labels]),
-        "weighting": ("scheme", [w for _, w in labels]),
-        "observable": names,
-        "time": np.array(samplers[0].plan.times),
-    }
-    chosen = {
-        "methods": [s.plan.method.name for s in samplers],
-        "weightings": [_label(s.plan.weighting) for s in samplers],
-    }
-    given = described(samplers[0], int(replicas)) | {"reference": source} | chosen
-    for one in ("method", "method_reason", "weighting", "weighting_reason", "weighting_settings"):
-        del given[one]
-    ds = xr.Dataset(variables, coordinates, provenance("Efficiency of methods", given))
-    return labelled(ds, _LONG_NAMES)
+    return variables | {"reference": (("observable", "time"), reference)}
+
+
+def _warnings(
+    samplers: Sequence[Sampler], found: Sequence[Collected], labels: Sequence[tuple[str, str]]
+) -> list[str]:
+    """Return the warnings of all schemes, each with those that it is about, unless that is all."""
+    schemes: dict[str, list[str]] = {}
+    for sampler, each, label in zip(samplers, found, labels, strict=True):
+        for text in each.totals.warnings(sampler.plan):
+            schemes.setdefault(text, []).append(", ".join(label))
+    return [
+        text if len(about) == len(samplers) else f"{'; '.join(about)}: {text}"
+        for text, about in schemes.items()
+    ]
 
 
 def _pairs(methods: Any, weightings: Any, schemes: Any, problems: list[str]) -> list[Any]:
@@ -242,7 +270,7 @@ def _reference(sampler: Sampler, names: Sequence[str], exact: Any) -> tuple[Floa
 
 def _biased(found: Sequence[Collected], reference: Float) -> dict[str, Float]:
     """Return the bias of each pair and its interval."""
-    moments = [each.total for each in found]
+    moments = [each.moments for each in found]
     bias = np.array([m.mean - reference for m in moments])
     half = np.array([quantile(m.count) * m.error for m in moments])
     return {"bias": bias, "bias_lower": bias - half, "bias_upper": bias + half}
@@ -251,8 +279,8 @@ def _biased(found: Sequence[Collected], reference: Float) -> dict[str, Float]:
 def _compared(found: Sequence[Collected]) -> dict[str, Float]:
     """Return efficiencies, their ratios to the first, intervals of both, and which are best."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        values = np.array([1.0 / (each.cost()[0] * each.total.variance) for each in found])
-        scatter = np.array([each.total.relative_error for each in found])
+        values = np.array([1.0 / (each.cost()[0] * each.moments.variance) for each in found])
+        scatter = np.array([each.moments.relative_error for each in found])
         ratio = values / values[0]
     # a chance of the normal law, as the many replicas give it; few batches have a wider one
     cost = np.array([_cost_error(each) for each in found])[:, None, None]

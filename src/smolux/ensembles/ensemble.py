@@ -12,15 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from smolux.analysis.statistics import quantile
 from smolux.checks import whole
+from smolux.errors import InputError, Interrupted, OutOfMemoryError
 from smolux.methods.base import Method
 from smolux.model import Model
 from smolux.model_dict import model_to_dict
 from smolux.resources import cores
-from smolux.results import provenance
+from smolux.results import provenance, told
 from smolux.weighting.base import Weighting
 
 from .batches import Batch, Sampler, interleaved, make_sampler
-from .moments import Moments
 
 Float = NDArray[np.float64]
 
@@ -42,16 +42,15 @@ LONG_NAMES = {
 class Collected:
     """What the batches of one sampler add up to."""
 
-    def __init__(self) -> None:
-        self.moments: Moments | None = None
-        self.collisions = 0
+    def __init__(self, first: Batch) -> None:
+        self.moments, self.totals = first.moments, first.totals
         #: replicas and processor seconds of each batch
-        self.spent: list[tuple[int, float]] = []
+        self.spent = [(first.moments.count, first.seconds)]
 
     def add(self, batch: Batch) -> None:
         """Add a batch to those before it."""
-        self.moments = batch.moments if self.moments is None else self.moments + batch.moments
-        self.collisions += batch.collisions
+        self.moments += batch.moments
+        self.totals += batch.totals
         self.spent.append((batch.moments.count, batch.seconds))
 
     def cost(self) -> tuple[float, float, int]:
@@ -68,15 +67,9 @@ class Collected:
         whole_ones = counts == counts[0]
         return np.asarray(seconds[whole_ones] / counts[whole_ones])
 
-    @property
-    def total(self) -> Moments:
-        """The moments of all batches."""
-        assert self.moments is not None
-        return self.moments
-
     def variables(self) -> dict[str, Any]:
         """Return the variables of the Dataset, without those that `ensemble` alone knows."""
-        moments = self.total
+        moments = self.moments
         cost, relative, batches = self.cost()
         ratio = float(np.exp(quantile(batches) * relative))
         dims = ("observable", "time")
@@ -93,7 +86,7 @@ class Collected:
             "cost": ((), cost),
             "cost_lower": ((), cost / ratio),
             "cost_upper": ((), cost * ratio),
-            "collisions": ((), self.collisions / moments.count),
+            "collisions": ((), self.totals.collisions / moments.count),
         }
 
 
@@ -148,7 +141,15 @@ def ensemble(
     Raises
     ------
     InputError
-        With every mistake in the arguments, or when the kernel gives no valid rate.
+        With every mistake in the arguments, or when the kernel gives no valid rate; if that is
+        found late, with the statistics of the replicas before as its ``dataset``.
+    Interrupted
+        On Ctrl-C, with the same.
+
+    Warns
+    -----
+    SmoluxWarning
+        What `smolux.results.warnings` lists, as `simulate` does.
 
     Examples
     --------
@@ -165,20 +166,60 @@ def ensemble(
         problems,
     )  # fmt: skip
     begun = time.perf_counter()
-    collected = Collected()
-    for _, batch in interleaved([sampler], int(replicas), workers, progress):
-        collected.add(batch)
-    attributes = {
-        **described(sampler, int(replicas)),
-        "collisions_per_second": collected.collisions / sum(s for _, s in collected.spent),
-        "wall_seconds": time.perf_counter() - begun,
-    }
     names = [observables] if isinstance(observables, str) else list(observables)
-    coordinates = {"observable": names, "time": np.array(sampler.plan.times)}
-    ds = xr.Dataset(
-        collected.variables(), coordinates, provenance("Statistics of an ensemble", attributes)
-    )
-    return labelled(ds, LONG_NAMES)
+
+    def dataset(found: list[Collected], *remarks: str) -> xr.Dataset:
+        collected = found[0]
+        spent = sum(seconds for _, seconds in collected.spent)
+        attributes = {
+            **described(sampler, found, int(replicas)),
+            "warnings": [*collected.totals.warnings(sampler.plan), *remarks],
+            "collisions_per_second": collected.totals.collisions / spent,
+            "wall_seconds": time.perf_counter() - begun,
+        }
+        coordinates = {"observable": names, "time": np.array(sampler.plan.times)}
+        given = provenance("Statistics of an ensemble", attributes)
+        return labelled(xr.Dataset(collected.variables(), coordinates, given), LONG_NAMES)
+
+    return told(collect([sampler], int(replicas), workers, progress, dataset))
+
+
+def collect(
+    samplers: Sequence[Sampler],
+    replicas: int,
+    workers: int,
+    progress: Callable[[float], None] | None,
+    dataset: Callable[..., xr.Dataset],
+) -> xr.Dataset:
+    """Run the replicas of all samplers in turns and return ``dataset(collected, *remarks)`` of all.
+
+    Raises
+    ------
+    InputError, Interrupted
+        With the dataset of the turns that were complete, if there are any.
+    """
+    found: list[Collected] = []
+
+    def kept(*problems: str) -> xr.Dataset | None:
+        if not found:
+            return None
+        count = found[0].moments.count
+        return dataset(found, *problems, f"statistics of {count} of {replicas} replicas")
+
+    try:
+        for turn in interleaved(samplers, replicas, workers, progress):
+            if found:
+                for each, batch in zip(found, turn, strict=True):
+                    each.add(batch)
+            else:
+                found = [Collected(batch) for batch in turn]
+    except KeyboardInterrupt:
+        raise Interrupted("interrupted", kept()) from None
+    except (InputError, MemoryError) as error:
+        late = error if isinstance(error, InputError) else OutOfMemoryError()
+        late.dataset = kept(*late.problems)
+        raise late from None
+    return dataset(found)
 
 
 def checked_threads(threads: Any, problems: list[str]) -> int:
@@ -190,9 +231,9 @@ def checked_threads(threads: Any, problems: list[str]) -> int:
     return number
 
 
-def described(sampler: Sampler, replicas: int) -> dict[str, Any]:
-    """Return the attributes that say what was simulated."""
-    plan = sampler.plan
+def described(sampler: Sampler, found: Sequence[Collected], wanted: int) -> dict[str, Any]:
+    """Return the attributes that say what was simulated, of the replicas that were `wanted`."""
+    plan, replicas = sampler.plan, found[0].moments.count
     return {
         "model": model_to_dict(plan.model),
         "method": plan.method.name,
@@ -203,6 +244,7 @@ def described(sampler: Sampler, replicas: int) -> dict[str, Any]:
         "population": plan.population,
         "initial_particles": plan.particles,
         "replicas": replicas,
+        "complete": replicas == wanted,
         "seed": str(plan.entropy),
     }
 

@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core import rng
+from ..core.bounds import ROUNDING, note_bad, note_largest, repair
 from ..core.burst import NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
 from ..core.levels import renew_majorant
-from ..core.loop import PATIENCE, ROUNDING, Pieces, note_bad, note_largest, repair
+from ..core.loop import PATIENCE, Pieces
 from ..core.prefetch import prefetch
 from ..core.state import (
     FIRST,
@@ -103,16 +104,18 @@ def _make_find(rate: Any) -> Any:
         return rate(float(i), float(j), *p)
 
     @piece
-    def find(s, w, p, factor, held, n, trials, c0, c1, c2, c3):
+    def find(s, w, p, factor, limit, held, n, trials, c0, c1, c2, c3):
         """See `smolux.core.burst.Burst`; NaN for a rate that is none, which has been noted."""
         majorant, monomers = s.clock[MAJORANT], held.monomers
         unit = held.unit / (float(n) * float(n - 1))
         waited, last = 0.0, trials + PATIENCE
         while trials < last:
             k = at(2 * (trials & (AHEAD - 1)))
-            trials += 1
             x, c0, c1, c2, c3 = rng.exponential_of(s.rng, c0, c1, c2, c3)
             waited += x
+            if limit < math.inf and waited * unit >= limit:
+                return limit, -1, -1, 0, 0, trials, c0, c1, c2, c3
+            trials += 1
             a, b = np.int64(w.ahead[k] * n), np.int64(w.ahead[k + _ONE] * (n - 1))
             b += b >= a
             u, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)
@@ -143,7 +146,7 @@ def _make_draw(find: Any) -> Any:
     draw_one = make_draw_one(find)
 
     @piece
-    def draw(s, w, p, factor):
+    def draw(s, w, p, factor, limit):
         s.count[FIRST] = -1
         if s.count[PARTICLES] < 2:
             return math.inf
@@ -152,7 +155,7 @@ def _make_draw(find: Any) -> Any:
         if w.ahead[0] < 0.0:
             for k in range(2 * AHEAD):
                 w.ahead[k] = rng.uniform(s.rng)
-        return draw_one(s, w, p, factor, _hold(s, w, factor))
+        return draw_one(s, w, p, factor, limit, _hold(s, w, factor))
 
     return draw
 

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..core import rng
+from ..core.bounds import note_bad, note_largest
 from ..core.compile import cold_piece, piece
-from ..core.loop import Pieces, note_bad, note_largest
+from ..core.loop import Pieces
 from ..core.state import FIRST, LARGEST, PARTICLES, SECOND, SINCE, STORED, TRIALS, VALUE, VOLUME
 from ..core.sums import find, find_large, shift, weigh
 from .inverse_store import double, make_visit, pair, pick, remove, seize, size_at, top_of, view
@@ -139,7 +140,7 @@ def _make_draw(pair_rate: Any, row_of: Any, total_of: Any) -> Any:
         return slot
 
     @cold_piece
-    def draw(s, w, p, factor):
+    def draw(s, w, p, factor, limit):
         s.count[FIRST] = -1
         s.count[TRIALS] += 1
         if not 0.0 <= s.clock[VALUE] < math.inf:

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..core import rng
+from ..core.bounds import ROUNDING, note_bad, repair
 from ..core.compile import cold_piece, piece
-from ..core.loop import PATIENCE, ROUNDING, note_bad, repair
+from ..core.loop import PATIENCE
 from ..core.prefetch import prefetch
 from ..core.segment_tree import add, find, find_mixed
 from ..core.state import FIRST, FLOOR, PARTICLES, TRIALS, VALUE, VOLUME
@@ -216,17 +217,19 @@ def make_draw(rate: Any) -> Any:
         return verdict
 
     @cold_piece
-    def draw_with_apart(s, w, p, factor, others):
+    def draw_with_apart(s, w, p, factor, limit, others):
         """Do the same with a particle that is held apart; `others` is the sum without it."""
         stage, apart = w.meta[STAGE], _with_apart(w, w.meta[STAGE])
         total = others + apart
         if not total > 0.0:
             return math.inf if s.clock[VALUE] == 0.0 else math.nan
         raised = max(1.0, s.clock[FLOOR])
-        wait = 0.0
+        wait, unit = 0.0, s.clock[VOLUME] / (total * raised * factor) * w.units[stage]
         for _ in range(PATIENCE):
-            s.count[TRIALS] += 1
             wait += rng.exponential(s.rng)
+            if limit < math.inf and wait * unit >= limit:
+                return limit
+            s.count[TRIALS] += 1
             x = rng.uniform(s.rng) * total
             if x < apart:
                 _pair_with_apart(w, stage, x)
@@ -242,7 +245,7 @@ def make_draw(rate: Any) -> Any:
         return wait * s.clock[VOLUME] / (total * raised * factor) * w.units[stage]
 
     @piece
-    def draw(s, w, p, factor):
+    def draw(s, w, p, factor, limit):
         s.count[FIRST] = -1
         stage = w.meta[STAGE]
         total = 0.0
@@ -251,15 +254,17 @@ def make_draw(rate: Any) -> Any:
         if s.count[PARTICLES] < 2:
             return math.inf
         if w.meta[APART] > 0:
-            return draw_with_apart(s, w, p, factor, total)
+            return draw_with_apart(s, w, p, factor, limit, total)
         if not total > 0.0:
             return math.inf if s.clock[VALUE] == 0.0 else math.nan
         # a majorant that was found broken is raised as a whole
         raised = max(1.0, s.clock[FLOOR])
-        wait = 0.0
+        wait, unit = 0.0, s.clock[VOLUME] / (total * raised * factor) * w.units[stage]
         for _ in range(PATIENCE):
-            s.count[TRIALS] += 1
             wait += rng.exponential(s.rng)
+            if limit < math.inf and wait * unit >= limit:
+                return limit
+            s.count[TRIALS] += 1
             _choose_pair(s, w, stage, total)
             verdict = collides(s, w, p, stage, raised)
             if verdict < 0:

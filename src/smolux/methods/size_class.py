@@ -7,7 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..core.loop import ROUNDING, Pieces
+from ..core.bounds import ROUNDING
+from ..core.loop import Pieces
 from ..core.slots import slot_edges
 from ..core.state import MAJORANT, PARTICLES, SINCE, TIME, State
 from ..errors import InputError

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..core import alias, rng
+from ..core.bounds import ROUNDING, note_bad, repair
 from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
-from ..core.loop import PATIENCE, ROUNDING, Pieces, note_bad, repair
+from ..core.loop import PATIENCE, Pieces
 from ..core.prefetch import prefetch
 from ..core.slots import slot_of
 from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, TRIALS, VOLUME
@@ -86,16 +87,32 @@ def _draw_ahead(w, s, a, b, c, d):
     return a, b, c, d
 
 
-@cold_piece
-def _raise_bound(s, w, g, h, i, j, value):
-    """Take in a rate above its bound."""
-    repair(s, i, j, value, w.high[g, h])
+@piece
+def _raise_bound(w, g, h, value):
     w.high[g, h] = w.high[h, g] = 1.1 * value
     w.low[g, h] = w.low[h, g] = 0.0
     w.meta[STALE] = 1
 
 
 def _make_find(rate: Any) -> Any:
+    @cold_piece
+    def look_beside(w, g, size, p):
+        """Try a size that broke one bound with one particle of each class: it may break more."""
+        for h in range(w.number.shape[0]):
+            if w.number[h] > 0:
+                other = size_of_particle(w, np.int64(h) << SLOT_BITS)
+                value = rate(float(size), float(other), *p)
+                if w.high[g, h] * ROUNDING < value < math.inf:
+                    _raise_bound(w, g, h, value)
+
+    @cold_piece
+    def broken(s, w, g, h, i, j, value, p):
+        """Take in a rate above its bound, and others that may be, before they are missed."""
+        repair(s, i, j, value, w.high[g, h])
+        _raise_bound(w, g, h, value)
+        look_beside(w, g, i, p)
+        look_beside(w, h, j, p)
+
     @piece
     def accepts(s, w, g, h, i, j, k, p):
         """Whether the rate accepts candidate `k`: 1 or 0; -1 if there is no rate."""
@@ -108,13 +125,13 @@ def _make_find(rate: Any) -> Any:
                 note_bad(s, i, j, value)
                 return -1
             if value > w.high[at(g), at(h)] * ROUNDING:
-                _raise_bound(s, w, g, h, i, j, value)
+                broken(s, w, g, h, i, j, value, p)
             return 1
         u = alias.remainder(w.table, np.uint64(column), w.rest[at(k)])
         return 1 if u * w.high[at(g), at(h)] < value else 0
 
     @piece
-    def find(s, w, p, factor, held, n, trials, c0, c1, c2, c3):
+    def find(s, w, p, factor, limit, held, n, trials, c0, c1, c2, c3):
         """See `smolux.core.burst.Burst`; NaN for a rate that is none, which has been noted."""
         waited, last = 0.0, trials + PATIENCE
         while trials < last:
@@ -122,8 +139,10 @@ def _make_find(rate: Any) -> Any:
                 c0, c1, c2, c3 = _draw_ahead(w, s.rng, c0, c1, c2, c3)
             k = w.meta[NEXT]
             w.meta[NEXT] = k + 1
-            trials += 1
             waited += w.wait[at(k)]
+            if limit < math.inf and waited * held[0] >= limit:
+                return limit, -1, -1, 0, 0, trials, c0, c1, c2, c3
+            trials += 1
             one, two = w.one[at(k)], w.two[at(k)]
             g, a, h, b = one >> SLOT_BITS, one & SLOT, two >> SLOT_BITS, two & SLOT
             if a >= w.number[at(g)] or b >= w.number[at(h)] or one == two:
@@ -146,11 +165,11 @@ def _make_draw(find: Any) -> Any:
     draw_one = make_draw_one(find)
 
     @piece
-    def draw(s, w, p, factor):
+    def draw(s, w, p, factor, limit):
         s.count[FIRST] = -1
         if s.count[PARTICLES] < 2 or s.clock[MAJORANT] <= 0.0:
             return math.inf
-        return draw_one(s, w, p, factor, _hold(s, w, factor))
+        return draw_one(s, w, p, factor, limit, _hold(s, w, factor))
 
     return draw
 

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import AutoMinorLocator, Formatter, LogLocator, NullFormatter
 
 from smolux.errors import InputError
-from smolux.files import replacing
+from smolux.files import destination, replacing
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -223,6 +223,29 @@ def root_of(drawn: Figure | Axes) -> Figure:
     return figure
 
 
+#: no dates and no version, which would make equal figures differ
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+    "svg": {"Date": None, "Creator": None},
+}
+
+
+def kind_of(path: str | os.PathLike[str]) -> str:
+    """Return which kind of file a figure is to be, before anything is computed for it.
+
+    Raises
+    ------
+    InputError
+        If it is none, or cannot be written there.
+    """
+    kind = Path(path).suffix.lower().lstrip(".")
+    if kind not in _METADATA:
+        raise InputError(f"path = {os.fspath(path)!r}: must end in .png, .pdf or .svg")
+    destination(path)
+    return kind
+
+
 def save(figure: Figure | Axes, path: str | os.PathLike[str], *, dpi: int = 300) -> Path:
     """Write a figure, whole or not at all; the same figure gives the same bytes.
 
@@ -245,17 +268,8 @@ def save(figure: Figure | Axes, path: str | os.PathLike[str], *, dpi: int = 300)
     OSError
         If it cannot be written; an old file stays as it was.
     """
-    root = root_of(figure)
-    kind = Path(path).suffix.lower().lstrip(".")
-    # no dates and no version, which would make equal figures differ
-    metadata: dict[str, dict[str, Any]] = {
-        "png": {"Software": None},
-        "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-        "svg": {"Date": None, "Creator": None},
-    }
-    if kind not in metadata:
-        raise InputError(f"path = {os.fspath(path)!r}: must end in .png, .pdf or .svg")
+    root, kind = root_of(figure), kind_of(path)
     settings = {"svg.hashsalt": "smolux", "svg.fonttype": "path", "pdf.fonttype": 42}
     with mpl.rc_context(settings), replacing(path) as temporary:
-        root.savefig(temporary, format=kind, dpi=dpi, metadata=metadata[kind])
+        root.savefig(temporary, format=kind, dpi=dpi, metadata=_METADATA[kind])
     return Path(path)

@@ -12,6 +12,9 @@ from .trace import Trace
 
 Float = NDArray[np.float64]
 
+#: of what the memory is looked at before it grows
+LISTS = "lists of discs that may meet"
+
 
 class Run:
     """One simulation on its way; `advance` is called until it says why it is over.

@@ -214,7 +214,10 @@ class _Driver:
         budget = int(min(_BUDGET, most - self.run.events))
         if budget <= 0:
             return f"the limit of {most:g} events is reached"
-        code = self.run.advance(until, self.target, budget)
+        try:
+            code = self.run.advance(until, self.target, budget)
+        except OutOfMemoryError as error:
+            return str(error)
         spent = clock.perf_counter() - self.started
         self.compile_seconds = self.compile_seconds or spent
         if code is None and spent > limit:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..room import needed
 from .eventlog import Logger, reasons
-from .method import Run, SpatialMethod
+from .method import LISTS, Run, SpatialMethod
 from .system import System
 from .trace import Trace, empty_series, observe
 
@@ -167,10 +168,13 @@ class SteppingRun(Run):
             self._observe()
         elif code == stepping.NO_PAIRS:
             room = 2 * len(self.state.due)
-            pair, due = np.empty((room, 2), np.int32), np.empty(room)
-            self.state = self.state._replace(pair=pair, due=due)
+            with needed(16 * room, LISTS):
+                pair, due = np.empty((room, 2), np.int32), np.empty(room)
+                self.state = self.state._replace(pair=pair, due=due)
         elif code == stepping.NO_NEARS:
-            self.local = self._scratch(type(self.local), 2 * len(self.local.multiplier))
+            room = 2 * len(self.local.multiplier)
+            with needed(24 * room, LISTS):
+                self.local = self._scratch(type(self.local), room)
         elif code == stepping.DONE:
             while self._next < len(times) and times[self._next] <= self.time:
                 self._observe()

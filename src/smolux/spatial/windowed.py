@@ -10,8 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..room import needed
 from .eventlog import Logger, reasons
-from .method import Run, SpatialMethod
+from .method import LISTS, Run, SpatialMethod
 from .overlaps import cells_for
 from .system import System
 from .trace import Trace
@@ -271,15 +272,21 @@ class WindowedRun(Run):
 
     def _recover(self, code: int) -> None:
         """Make the skin thinner, or room, when something was full."""
-        flight = self._flight
+        f, flight = self.flight, self._flight
+        if code == flight.NO_PAIRS and self.clock[flight.SKIN] > _THIN * self.clock[flight.USUAL]:
+            self.clock[flight.SKIN] /= 2
+            self._repack()
+            return
+        pairs, events = self._room
+        more = 0
         if code == flight.NO_PAIRS:
-            if self.clock[flight.SKIN] > _THIN * self.clock[flight.USUAL]:
-                self.clock[flight.SKIN] /= 2
-            else:
-                self._room[0] *= 2
+            pairs, more = 2 * pairs, f.half_edge.nbytes
         elif code == flight.NO_EVENTS:
-            self._room[1] *= 2
-        self._repack()
+            events, more = 2 * events, f.when.nbytes + f.event.nbytes
+        with needed(more, LISTS):
+            self._room = [pairs, events]
+            del f
+            self._repack()
 
     @property
     def time(self) -> float:  # type: ignore[override]

@@ -129,8 +129,12 @@ def make_sweep(
     Raises
     ------
     InputError
-        If the file cannot be read.
+        If the file cannot be read, or a key is changed and swept over.
     """
+    keys = {axis.key for axis in axes}
+    twice = [item for item in sets if item.partition("=")[0].strip() in keys]
+    if twice:
+        raise InputError([f"set {item}: this key is swept over; leave out one" for item in twice])
     if isinstance(case, Case):
         text, source = case.to_toml(), "case"
     else:

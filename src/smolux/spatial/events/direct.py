@@ -11,8 +11,9 @@ from ...core.compile import entry, piece
 from .geometry import (
     FILLED,
     NARROW,
+    add_axis,
+    apart,
     contact_time,
-    crossed,
     other_image,
     shift,
     smaller,
@@ -72,20 +73,14 @@ def pair_time(discs, i, j, d, images):
     """Time to the contact of two discs, from the nearest image or the `images` nearest."""
     s, best = discs.radius[i] + discs.radius[j], math.inf
     for code in range(images):
-        a, b, c, cross = 0.0, 0.0, -s * s, 0.0
-        x1, w1, x2, w2 = 0.0, 0.0, 0.0, 0.0  # components before
+        sums = apart(s)
         for k in range(d):
             dx = discs.x[j, k] - discs.x[i, k]
             dx += shift(dx, discs.period[k])
             if code & (1 << k):
                 dx += other_image(dx, discs.period[k])
-            w = discs.v[j, k] - discs.v[i, k]
-            a += w * w
-            b += dx * w
-            c += dx * dx
-            cross += crossed(dx, w, x1, w1, x2, w2)
-            x1, w1, x2, w2 = dx, w, x1, w1
-        best = smaller(best, contact_time(a, b, c, s, cross))
+            sums = add_axis(sums, dx, discs.v[j, k] - discs.v[i, k])
+        best = smaller(best, contact_time(sums, s))
     return best
 
 

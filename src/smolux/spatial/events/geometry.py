@@ -26,21 +26,32 @@ def smaller(a, b):
 
 
 @piece
-def crossed(x, w, x1, w1, x2, w2):
-    """Return what components k of d and w add to ``|d x w|^2``; the others are those before k."""
-    one, two = x * w1 - x1 * w, x * w2 - x2 * w
-    return one * one + two * two
+def apart(s):
+    """Begin the sums that `contact_time` needs, for two discs whose radii add up to `s`.
+
+    With the separation d and the relative velocity w: ``|w|^2``, ``d.w``, ``|d|^2 - s^2``,
+    ``|d x w|^2``; then the components of d and w along the two axes before, for the last of these.
+    """
+    return 0.0, 0.0, -s * s, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @piece
-def contact_time(a, b, c, s, cross):
+def add_axis(sums, x, w):
+    """Add the components of d and w along one more axis."""
+    a, b, c, cross, x1, w1, x2, w2 = sums
+    one, two = x * w1 - x1 * w, x * w2 - x2 * w
+    return a + w * w, b + x * w, c + x * x, cross + (one * one + two * two), x, w, x1, w1
+
+
+@piece
+def contact_time(sums, s):
     """Time to the contact of two discs; infinite if they miss each other.
 
-    With the separation d, the relative velocity w and the sum of radii s: ``a = |w|^2``,
-    ``b = d.w``, ``c = |d|^2 - s^2``, ``cross = |d x w|^2``. The root of ``a t^2 + 2 b t + c`` is
-    taken in the form without cancellation, and so is ``b^2 - a c``, which from afar would lose the
-    radii. Discs that touch and approach meet now; those that part never do.
+    With the sums a, b, c and cross of `add_axis`: the root of ``a t^2 + 2 b t + c`` is taken in the
+    form without cancellation, and so is ``b^2 - a c``, which from afar would lose the radii. Discs
+    that touch and approach meet now; those that part never do.
     """
+    a, b, c, cross = sums[:4]
     if b >= 0.0:
         return math.inf
     if c <= 0.0:

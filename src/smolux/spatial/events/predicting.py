@@ -32,7 +32,7 @@ from .flight import (
     VERSION,
     WAY,
 )
-from .geometry import contact_time, crossed, other_image, shift, smaller, wall_time
+from .geometry import add_axis, apart, contact_time, other_image, shift, smaller, wall_time
 from .heap import push
 from .pairs import drop
 
@@ -58,8 +58,7 @@ def bind(d):
         s = f.radius[i * f.count[SPREAD]] + f.radius[j * f.count[SPREAD]]
         best = math.inf
         for code in range(1, f.count[IMAGES]):
-            a, b, c, cross = 0.0, 0.0, -s * s, 0.0
-            x1, w1, x2, w2 = 0.0, 0.0, 0.0, 0.0  # components before
+            sums = apart(s)
             for k in range(d):
                 vm, vn = body[m, d + k], body[n, d + k]
                 x = f.rel[j, k] + f.place[h, k] + body[n, k] + vn * (t - body[n, since])
@@ -67,13 +66,8 @@ def bind(d):
                 x += shift(x, f.period[k])
                 if code & (1 << k):
                     x += other_image(x, f.period[k])
-                w = vn - vm
-                a += w * w
-                b += x * w
-                c += x * x
-                cross += crossed(x, w, x1, w1, x2, w2)
-                x1, w1, x2, w2 = x, w, x1, w1
-            best = smaller(best, contact_time(a, b, c, s, cross))
+                sums = add_axis(sums, x, vn - vm)
+            best = smaller(best, contact_time(sums, s))
         return best
 
     @piece
@@ -95,22 +89,16 @@ def bind(d):
         spread = f.count[SPREAD]
         s = radius[i * spread] + radius[j * spread]
         dm, dn = t - body[m, since], t - body[n, since]
-        a, b, c, cross = 0.0, 0.0, -s * s, 0.0
-        x1, w1, x2, w2 = 0.0, 0.0, 0.0, 0.0  # components before
+        sums = apart(s)
         for k in range(d):
             vm, vn = body[m, d + k], body[n, d + k]
             x = rel[j, k] + place[h, k] + body[n, k] + vn * dn
             x -= rel[i, k] + place[g, k] + body[m, k] + vm * dm
             x += shift(x, f.period[k])
-            w = vn - vm
-            a += w * w
-            b += x * w
-            c += x * x
-            cross += crossed(x, w, x1, w1, x2, w2)
-            x1, w1, x2, w2 = x, w, x1, w1
+            sums = add_axis(sums, x, vn - vm)
         f.count[PREDICTED] += 1
         half_edge[2 * p, VERSION] += 1
-        wait = contact_time(a, b, c, s, cross)
+        wait = contact_time(sums, s)
         if f.count[IMAGES] > 1:
             wait = smaller(wait, from_other_images(f, p, t))
         touch = t + wait

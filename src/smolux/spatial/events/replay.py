@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.compile import entry, piece
-from .geometry import crossed, shift
+from .geometry import add_axis, apart, shift
 
 
 class Forest(NamedTuple):
@@ -98,14 +98,10 @@ def describe(forest, merges, m, x, radius, period, ends, gap, a, b, work):
     """Write down what a merge is, before it happens; the two discs touch at `ends`."""
     i, j = ends
     mu = forest.mass[a] * forest.mass[b] / (forest.mass[a] + forest.mass[b])
-    square, distance, cross = 0.0, 0.0, 0.0
-    x1, w1, x2, w2 = 0.0, 0.0, 0.0, 0.0  # components before
+    sums = apart(0.0)
     for k in range(x.shape[1]):
-        w = forest.velocity[b, k] - forest.velocity[a, k]
-        square += w * w
-        distance += gap[k] * gap[k]
-        cross += crossed(gap[k], w, x1, w1, x2, w2)
-        x1, w1, x2, w2 = gap[k], w, x1, w1
+        sums = add_axis(sums, gap[k], forest.velocity[b, k] - forest.velocity[a, k])
+    square, _, distance, cross = sums[:4]
     distance = math.sqrt(distance)
     share = radius[i] / (radius[i] + radius[j])
     for k in range(x.shape[1]):

@@ -1,0 +1,167 @@
+"""The shape of every result: an `xarray.Dataset` with units, provenance and the seed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+from xarray.indexes import PandasIndex
+
+from smolux.model import Model
+from smolux.model_dict import model_to_dict
+from smolux.records import Records
+
+from .attributes import provenance
+
+Float = NDArray[np.float64]
+
+#: variable -> (dimensions, long name)
+VARIABLES: dict[str, tuple[tuple[str, ...], str]] = {
+    "number_density": (("replica", "time"), "number of clusters per unit volume"),
+    "moment": (("replica", "time", "order"), "moment of the size distribution, sum_k k^p n_k"),
+    "largest": (("replica", "time"), "size of the largest cluster"),
+    "particles": (("replica", "time"), "number of simulated particles"),
+    "collisions": (("replica", "time"), "number of collisions so far"),
+    "volume": (("replica", "time"), "simulated volume"),
+    "n": (("replica", "time", "size"), "number density of clusters of one size"),
+    "n_bin": (("replica", "time", "bin"), "number density of clusters in a bin of sizes"),
+    "events": (("replica", "time", "process"), "number of collisions so far, by outcome"),
+    "attempts": (("replica", "process"), "number of candidates for these, accepted or not"),
+    "extinction_time": (("replica",), "time at which all particles had become one cluster"),
+}
+
+_COORDINATES = {
+    "replica": "replica",
+    "time": "time",
+    "order": "order of the moment",
+    "size": "cluster size in monomers",
+    "process": "outcome of a collision",
+    "bin": "geometric centre of the sizes in a bin",
+    "bin_lower": "smallest size in a bin",
+    "bin_upper": "edge above a bin: the bin holds the whole sizes bin_lower <= k < bin_upper",
+    "bin_width": "number of whole sizes in a bin",
+}
+
+
+def _bins(edges: Float) -> dict[str, Any]:
+    """Coordinates of bins ``edges[b] <= k < edges[b + 1]`` of whole sizes."""
+    edges = np.asarray(edges, float)
+    first, stop = np.ceil(edges[:-1]), np.ceil(edges[1:])
+    last = np.maximum(stop - 1, first)
+    return {
+        "bin": np.sqrt(first * last),
+        "bin_lower": ("bin", first),
+        "bin_upper": ("bin", stop),
+        "bin_width": ("bin", stop - first),
+    }
+
+
+def _ragged(records: Records) -> dict[str, Any]:
+    """Return whole populations as a CF contiguous ragged array, one row for a replica and time."""
+    if records.distribution is None:
+        return {}
+    times, replicas = len(records.times), len(records.distribution)
+    rows = [
+        replica[t] if t < len(replica) else ((), ())
+        for replica in records.distribution
+        for t in range(times)
+    ]
+    sizes = [np.asarray(size, np.int64) for size, _ in rows]
+    counts = [np.asarray(count, np.int64) for _, count in rows]
+    empty = [np.empty(0, np.int64)]
+    return {
+        "instance_replica": ("instance", np.repeat(np.arange(replicas), times)),
+        "instance_time": ("instance", np.tile(np.asarray(records.times, float), replicas)),
+        "row_size": ("instance", np.array([s.size for s in sizes], np.int64)),
+        "sample_size": ("sample", np.concatenate(sizes + empty)),
+        "sample_count": ("sample", np.concatenate(counts + empty)),
+    }
+
+
+#: of systems that are open, see `Records.balance`
+_BALANCE = {
+    "mass": "mass in the simulated volume, in monomers",
+    "mass_in": "mass that sources have brought into this volume",
+    "mass_out": "mass that has left this volume",
+}
+
+_RAGGED_NAMES = {
+    "instance_replica": "replica of a population",
+    "instance_time": "time of a population",
+    "row_size": "number of different sizes in a population",
+    "sample_size": "cluster size in monomers",
+    "sample_count": "number of simulated particles of that size",
+}
+
+
+def _provenance(model: Model, records: Records) -> dict[str, Any]:
+    own = {"model": model_to_dict(model), "warnings": list(records.warnings)}
+    given = {k: v for k, v in records.attributes.items() if k != "units"}
+    return provenance("Kinetics of aggregation and fragmentation", own | given)
+
+
+def to_dataset(model: Model, records: Records) -> xr.Dataset:
+    """Put the records of a computation into the Dataset that every method and solver returns.
+
+    Parameters
+    ----------
+    model : Model
+        What was computed; stored as JSON text in the attribute ``model``.
+    records : Records
+        What was observed. Its ``attributes`` become attributes of the result; an entry ``units``
+        of it maps names of variables to their units, which are "1" where it says nothing.
+
+    Returns
+    -------
+    xarray.Dataset
+        With the dimensions replica, time, order, size, bin and process, see the page on the
+        dataset in the reference documentation.
+    """
+    units: Mapping[str, str] = records.attributes.get("units") or {}
+    replicas = np.shape(records.number_density)[0]
+    ragged = _ragged(records)
+    coordinates: dict[str, Any] = {
+        "replica": np.arange(replicas),
+        "time": np.asarray(records.times, float),
+        "order": np.asarray(records.orders, float),
+        "size": np.arange(1, np.shape(records.n)[2] + 1),
+        "process": np.asarray(records.processes, dtype=np.str_),
+        **_bins(records.bin_edges),
+        **{k: ragged.pop(k) for k in ("instance_replica", "instance_time") if k in ragged},
+    }
+    values = {
+        name: (dims, np.asarray(getattr(records, name), float))
+        for name, (dims, _) in VARIABLES.items()
+        if getattr(records, name) is not None
+    }
+    if records.balance is not None:
+        mass = (np.asarray(column, float) for column in records.balance)
+        values |= {k: (("replica", "time"), m) for k, m in zip(_BALANCE, mass, strict=True)}
+    ds = xr.Dataset({**values, **ragged}, _indexed(coordinates), _provenance(model, records))
+    long_names = _COORDINATES | _RAGGED_NAMES | _BALANCE
+    long_names |= {k: text for k, (_, text) in VARIABLES.items()}
+    for name in map(str, ds.variables):
+        ds[name].attrs["long_name"] = long_names[name]
+        if name not in ("process", "replica", "instance_replica"):
+            ds[name].attrs["units"] = units.get(name, "1")
+    if "row_size" in ds:
+        ds["row_size"].attrs["sample_dimension"] = "sample"
+    return ds
+
+
+def _indexed(coordinates: Mapping[str, Any]) -> xr.Coordinates:
+    """Return the same with indexes: to make them, xarray would load every library of arrays."""
+    found: dict[str, Any] = {}
+    indexes = {}
+    for name, values in coordinates.items():
+        if isinstance(values, np.ndarray):
+            index = PandasIndex(pd.Index(values), name, coord_dtype=values.dtype)
+            found |= index.create_variables()
+            indexes[name] = index
+        else:
+            found[name] = values
+    return xr.Coordinates(found, indexes)
