@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -16,6 +16,8 @@ from .axes import KERNELS, PROCESSES, STARTS, VARYING, Kernel, Process, Scale, S
 
 #: the sizes that the direct sum is given are at most so many
 DIRECT = 2000
+#: share of the time to gelation that is the most
+_NEAR = 0.7
 #: output times, in units of the last one
 _SHARES = (0.31, 1.0)
 
@@ -85,6 +87,17 @@ class Cell:
         )  # fmt: skip
 
 
+def _gels(cell: Cell) -> bool:
+    """Whether a gel may form: M2 of all that comes in, at once, times the time nears one."""
+    if cell.kernel.name != "multiplicative":
+        return False
+    problem, time = cell.problem, cell.times[-1]
+    n = problem.start(problem.largest)
+    second = float(n @ np.arange(1.0, len(n) + 1.0) ** 2)
+    come = sum(s**2 * r for p in problem.inflow for s, r in p.rates.items())
+    return (second + come * time) * time > _NEAR
+
+
 def _possible(start: Start, processes: Sequence[Process]) -> bool:
     families = [p.family for p in processes]
     fed = start.name != "empty" or "source" in families
@@ -114,7 +127,9 @@ def timed() -> Iterator[Cell]:
                     start = STARTS[(0, 4, 10)[chosen]]
                     if chosen == 0 and process.family == "source":
                         start = STARTS[-1]
-                    yield Cell(start, kernel, (process,), varying)
+                    cell = Cell(start, kernel, (process,), varying)
+                    if not _gels(cell):
+                        yield cell
 
 
 def mixed() -> Iterator[Cell]:
@@ -127,7 +142,8 @@ def mixed() -> Iterator[Cell]:
             if not _possible(start, turned):
                 continue
             varying = VARYING[(2 * s + p) % 5] if varies(turned) else VARYING[0]
-            yield Cell(start, KERNELS[(s + p) % 6], turned, varying)
+            cell = Cell(start, KERNELS[(s + p) % 6], turned, varying)
+            yield replace(cell, kernel=KERNELS[(s + p + 1) % 6]) if _gels(cell) else cell
 
 
 def unique(*parts: Iterator[Cell]) -> list[Cell]:
