@@ -17,9 +17,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from verification.solver import closed, judge, reference
+from verification.solver import closed, judge, matrix, reference
 from verification.solver.axes import KERNELS, PROCESSES, STARTS, VARYING
-from verification.solver.cells import Cell
+from verification.solver.cells import Cell, alone, mixed, timed, unique
+from verification.suite import plain
 
 import smolux as sx
 from smolux import analysis
@@ -71,8 +72,8 @@ def test_reference_sums_over_all_pairs(kernel, monkeypatch):
     loss, gain = reference.slow_sums(kernel.law, n)
     given = kernel.kernel(k[:, None], k[None, :])
     np.testing.assert_allclose(kernel.law.rate(k[:, None], k[None, :]), given, rtol=1e-14)
-    for matrix in (1500, 0):  # plain sums, transforms
-        monkeypatch.setattr(reference, "_MATRIX", matrix)
+    for most in (1500, 0):  # plain sums, transforms
+        monkeypatch.setattr(reference, "_MATRIX", most)
         sums = reference.Sums(kernel.law, 30)
         np.testing.assert_allclose(sums.loss(n), loss, rtol=1e-13)
         np.testing.assert_allclose(sums.gain(n), gain, rtol=1e-11, atol=1e-22)
@@ -463,3 +464,33 @@ def test_window_does_not_matter(name):
     for window in (12_000, 18_000):
         ds = solved(TWICE[name], times, window=window, method="low-rank")
         same(ds, chosen, CLOSE)
+
+
+# The verification
+
+
+def test_matrix_is_complete():
+    fed = [s.name for s in STARTS[:-1]]
+    cells = unique(alone(), timed(), mixed())
+    assert {(c.start.name, c.kernel.name) for c in cells if not c.processes} == {
+        (s, k.name) for s in fed for k in KERNELS
+    }
+    met = {(c.start.name, p.name) for c in cells for p in c.processes}
+    assert met >= {(s, p.name) for s in fed for p in PROCESSES}
+    met = {(c.processes[0].name, c.varying.name) for c in cells if c.processes}
+    assert met >= {(p.name, v.name) for p in PROCESSES if p.cut is None for v in VARYING}
+    met = {frozenset(p.name for p in c.processes) for c in cells}
+    assert met >= {
+        frozenset((a.name, b.name)) for a in PROCESSES for b in PROCESSES if a.family != b.family
+    }
+
+
+def test_verification_tells_right_from_wrong():
+    data = plain(matrix.compute(lambda: [cell("monomers", "constant")], quick=False))
+    item = matrix.ITEMS[1]
+    assert all(check.passed for check in item.present(data).checks)
+    runs = data["rows"][0]["runs"]
+    runs["direct"]["worst"], runs["low-rank"]["worst"] = 1e-6, None
+    outcome = item.present(data)
+    assert [check.passed for check in outcome.checks] == [True, False, False, True, True]
+    assert [row[3] for row in outcome.tables[-1].rows] == ["no result", "1e-06"]

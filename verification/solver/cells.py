@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -16,6 +16,8 @@ from .axes import KERNELS, PROCESSES, STARTS, VARYING, Kernel, Process, Scale, S
 
 #: the sizes that the direct sum is given are at most so many
 DIRECT = 2000
+#: share of the time to gelation that is the most
+_NEAR = 0.7
 #: output times, in units of the last one
 _SHARES = (0.31, 1.0)
 
@@ -85,6 +87,17 @@ class Cell:
         )  # fmt: skip
 
 
+def _gels(cell: Cell) -> bool:
+    """Whether a gel may form: M2 of all that comes in, at once, times the time nears one."""
+    if cell.kernel.name != "multiplicative":
+        return False
+    problem, time = cell.problem, cell.times[-1]
+    n = problem.start(problem.largest)
+    second = float(n @ np.arange(1.0, len(n) + 1.0) ** 2)
+    come = sum(s**2 * r for p in problem.inflow for s, r in p.rates.items())
+    return (second + come * time) * time > _NEAR
+
+
 def _possible(start: Start, processes: Sequence[Process]) -> bool:
     families = [p.family for p in processes]
     fed = start.name != "empty" or "source" in families
@@ -105,29 +118,36 @@ def alone() -> Iterator[Cell]:
 
 
 def timed() -> Iterator[Cell]:
-    """Yield every process with every kernel and all that varies, from two starts in turn."""
+    """Yield every process with all that varies; starts and two kernels take turns."""
     for p, process in enumerate(PROCESSES):
-        for k, kernel in enumerate(KERNELS):
-            for v, varying in enumerate(VARYING):
-                if varying.name == "none" or varies([process]):
-                    chosen = (p + 2 * k + 3 * v) % 3
-                    start = STARTS[(0, 4, 10)[chosen]]
-                    if chosen == 0 and process.family == "source":
-                        start = STARTS[-1]
-                    yield Cell(start, kernel, (process,), varying)
+        for v, varying in enumerate(VARYING):
+            for k in (p + v, p + v + 3):
+                start = STARTS[(0, 4, 10)[k % 3]]
+                if start is STARTS[0] and process.family == "source":
+                    start = STARTS[-1]
+                cell = Cell(start, KERNELS[k % 6], (process,), varying)
+                if (varying.name == "none" or varies([process])) and not _gels(cell):
+                    yield cell
 
 
 def mixed() -> Iterator[Cell]:
-    """Yield every start with every process and every pair of them; the rest takes turns."""
-    chosen = [*((p,) for p in PROCESSES), *combinations(PROCESSES, 2)]
-    for s, start in enumerate(STARTS):
-        for p, processes in enumerate(chosen):
+    """Yield every start with every process, and every pair of processes; the rest takes turns."""
+    for s in range(len(STARTS)):
+        for p, process in enumerate(PROCESSES):
+            yield from _turned(s, p, (process,))
+    for p, pair in enumerate(combinations(PROCESSES, 2)):
+        for s in (p % 16, (p + 7) % 16):
             # those that vary come first, now the one and now the other
-            turned = processes[::-1] if (s + p) % 2 else processes
-            if not _possible(start, turned):
-                continue
-            varying = VARYING[(2 * s + p) % 5] if varies(turned) else VARYING[0]
-            yield Cell(start, KERNELS[(s + p) % 6], turned, varying)
+            yield from _turned(s, p, pair[::-1] if (s + p) % 2 else pair)
+
+
+def _turned(s: int, p: int, processes: tuple[Process, ...]) -> Iterator[Cell]:
+    """Yield the s-th start with some processes, unless there is nothing to begin with."""
+    if not _possible(STARTS[s], processes):
+        return
+    varying = VARYING[(2 * s + p) % 5] if varies(processes) else VARYING[0]
+    cell = Cell(STARTS[s], KERNELS[(s + p) % 6], processes, varying)
+    yield replace(cell, kernel=KERNELS[(s + p + 1) % 6]) if _gels(cell) else cell
 
 
 def unique(*parts: Iterator[Cell]) -> list[Cell]:
