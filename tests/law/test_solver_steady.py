@@ -41,6 +41,69 @@ def test_multiplicative_kernel():
     assert state.moment(2) == pytest.approx((1 + 2 * lam) / (2 * lam), rel=1e-9)
 
 
+@pytest.mark.parametrize("lam", [0.05, 0.3, 0.5, 1.0, 10.0, 100.0])
+def test_constant_kernel_whatever_the_rate(lam):
+    state = steady_state(model(sx.kernels.Constant(), lam))
+    assert state.moment(0) == pytest.approx(2 * lam / (1 + 2 * lam), rel=1e-9)
+    assert state.moment(1) == pytest.approx(1, rel=1e-12)
+    # from the generating function: M2 = 1 + (1 + 2 lam) / (2 lam**2), see test_constant_kernel
+    assert state.moment(2) == pytest.approx(1 + (1 + 2 * lam) / (2 * lam**2), rel=1e-8)
+    k = np.arange(1.0, 21.0)
+    exact = 2 * lam * (1 + lam) / (1 + 2 * lam) * catalan(k, lam)
+    np.testing.assert_allclose(state.n[:20], exact, rtol=1e-8, atol=1e-15)
+
+
+@pytest.mark.parametrize("rate", [1.5, 3.0, 10.0])
+def test_evaporation(rate):
+    # K = 1: M0 = 1 - 1/(2 E), M2 = E/(E - 1); at E = 1 too much mass for a steady state
+    processes = [sx.processes.Aggregation(), sx.processes.Evaporation(rate)]
+    state = steady_state(sx.Model(sx.kernels.Constant(), processes))
+    assert state.moment(0) == pytest.approx(1 - 0.5 / rate, rel=1e-9)
+    assert state.moment(2) == pytest.approx(rate / (rate - 1), rel=1e-7)
+
+
+def test_fragmentation():
+    # K = F = 1: n_i n_j = n_{i+j} by detailed balance, so n_k = z**k, with z = (1 - z)**2
+    processes = [sx.processes.Aggregation(), sx.processes.Fragmentation(1.0)]
+    state = steady_state(sx.Model(sx.kernels.Constant(), processes))
+    np.testing.assert_allclose(state.n[1:20] / state.n[:19], state.n[1] / state.n[0], rtol=1e-8)
+    assert state.moment(0) == pytest.approx((np.sqrt(5) - 1) / 2, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("kernel", "process"),
+    [
+        (sx.kernels.Constant(), sx.processes.CollisionalFragmentation(1.0, [3, 2, 1])),
+        (sx.kernels.Ballistic(), sx.processes.Shattering(1.0)),
+        (sx.kernels.Brownian(), sx.processes.Evaporation("3*k**(2/3)")),
+    ],
+    ids=["debris", "ballistic", "drops"],
+)
+def test_solutions_end_in_the_steady_state(kernel, process):
+    case = sx.Model(kernel, [sx.processes.Aggregation(), process])
+    state = steady_state(case)
+    ds = sx.solve(case, [60.0], tolerance=1e-9)
+    found = ds["moment"].values[0, 0]
+    for order in range(4):
+        assert state.moment(order) == pytest.approx(found[order], rel=1e-7)
+
+
+def test_progress():
+    seen = []
+    state = steady_state(model(sx.kernels.Constant(), 1.0), progress=seen.append)
+    assert [p.iteration for p in seen] == list(range(state.iterations + 1))
+    assert seen[-1].residual == state.residual
+    assert seen[-1].window == len(state.n)
+    assert seen[-1].seconds >= seen[0].seconds >= 0
+
+
+def test_too_much_mass_for_a_steady_state(monkeypatch):
+    monkeypatch.setattr("smolux.deterministic.steady._LIMIT", 4096)
+    processes = [sx.processes.Aggregation(), sx.processes.Evaporation(0.1)]
+    with pytest.raises(SolverError, match="ever larger sizes"):
+        steady_state(sx.Model(sx.kernels.Constant(), processes))
+
+
 def test_steady_state_stays():
     case = model(sx.kernels.Brownian(), 0.2)
     state = steady_state(case)

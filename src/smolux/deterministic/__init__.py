@@ -3,12 +3,13 @@
 from .hopf import HopfThreshold, hopf_threshold
 from .integrate import SolverError
 from .solver import Progress, solve
-from .steady import SteadyState, eigenvalues, steady_state
+from .steady import SteadyProgress, SteadyState, eigenvalues, steady_state
 
 __all__ = [
     "HopfThreshold",
     "Progress",
     "SolverError",
+    "SteadyProgress",
     "SteadyState",
     "eigenvalues",
     "hopf_threshold",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 from scipy.sparse import linalg as krylov
 
+from ..processes import Evaporation
 from .equations import Equations
 from .terms import Totals
 
@@ -16,6 +18,8 @@ Float = NDArray[np.float64]
 
 #: bands of the preconditioner, and numbers in them, at most
 _BANDS, _NUMBERS = 128, 1 << 24
+#: how far it is kept from being singular, relative to the rate of collisions
+_APART = 0.1
 
 
 class Linearisation:
@@ -47,6 +51,7 @@ class Linearisation:
         self.turnover = float((n * frequency) @ self.sizes)
         count = min(_BANDS, max(_NUMBERS // len(n), 16), len(n))
         self._frequency = frequency
+        self._above = _evaporation(equations)
         self._band = gain * equations.operator.columns(count) * n[:count]
 
     def _closed(self, rates: Float) -> Float:
@@ -66,23 +71,46 @@ class Linearisation:
         found = [self._closed(row) for row in (above - below) * (0.5 * size)]
         return found[0] + 1j * found[1] if len(found) == 2 else found[0]
 
-    def solve(self, shift: complex, right: NDArray[Any], tolerance: float) -> NDArray[Any]:
-        """Return ``(shift - J)^{-1} right``, by GMRES with the bands of J below the diagonal.
+    def _preconditioner(
+        self, shift: complex, dtype: type
+    ) -> Callable[[NDArray[Any]], NDArray[Any]]:
+        """Return what solves a shifted system of the bands of J."""
+        count, bands = self._band.shape
+        above = int(self._above is not None)
+        matrix = np.empty((above + bands + 1, count), dtype)
+        if self._above is not None:
+            matrix[0, 0], matrix[0, 1:] = 0.0, -self._above
+        matrix[above] = shift + self._frequency
+        matrix[above + 1 :] = -self._band.T
+        if self._above is None:
+            banded = lapack.ztbtrs if dtype is complex else lapack.dtbtrs
+            return lambda v: banded(matrix, v.astype(dtype)[:, None], uplo="L")[0][:, 0]
+        room: NDArray[Any] = np.zeros((bands, count), dtype)
+        factor, use = (
+            (lapack.zgbtrf, lapack.zgbtrs) if dtype is complex else (lapack.dgbtrf, lapack.dgbtrs)
+        )
+        lu, pivots, _ = factor(np.concatenate([room, matrix]), bands, above)
+        return lambda v: use(lu, bands, above, v.astype(dtype)[:, None], pivots)[0][:, 0]
 
-        The part of J that the bands leave out is nearly of low rank: few iterations are needed.
+    def solve(
+        self, shift: complex, right: NDArray[Any], tolerance: float, *, mass: bool = False
+    ) -> NDArray[Any]:
+        """Return ``(shift - J)^{-1} right``, by GMRES with the bands of J near the diagonal.
+
+        The part of J that the bands leave out is nearly of low rank: few iterations are needed. J
+        has the eigenvalue zero, of states with another mass. If `right` holds no `mass`, nor does
+        the solution: then it is that of a system in which this eigenvalue is moved away.
         """
         dtype: type = complex if np.iscomplexobj(right) or isinstance(shift, complex) else float
-        matrix = np.empty((len(self.n), self._band.shape[1] + 1), dtype)
-        matrix[:, 0] = shift + self._frequency
-        matrix[:, 1:] = -self._band
-        banded = lapack.ztbtrs if dtype is complex else lapack.dtbtrs
-
-        def precondition(v: NDArray[Any]) -> NDArray[Any]:
-            return banded(matrix.T, v.astype(dtype)[:, None], uplo="L")[0][:, 0]
+        # the bands alone may be nearly singular, too
+        precondition = self._preconditioner(shift + (_APART * self.scale if mass else 0.0), dtype)
 
         def act(z: NDArray[Any]) -> NDArray[Any]:
             v = z / self.weight
-            return self.weight * precondition(shift * v - self.product(v))
+            image = shift * v - self.product(v)
+            if mass:
+                image += self.scale * float(v @ self.sizes) / float(self.n @ self.sizes) * self.n
+            return self.weight * precondition(image)
 
         count = len(self.n)
         operator = krylov.LinearOperator((count, count), matvec=act, dtype=dtype)
@@ -95,3 +123,11 @@ class Linearisation:
             maxiter=3,
         )
         return z / self.weight
+
+
+def _evaporation(equations: Equations) -> Float | None:
+    """Return the rates at which sizes ``2 .. M`` become the next smaller, if they do."""
+    evaporating = [p for p in equations.processes if isinstance(p, Evaporation)]
+    if not evaporating:
+        return None
+    return np.asarray(sum(p.factor(0.0) * p.rates(equations.sizes)[1:] for p in evaporating))

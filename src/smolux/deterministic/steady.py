@@ -24,8 +24,9 @@ from .window import Window
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_LIMIT = 1 << 20
-_ITERATIONS = 300
+_LIMIT = 1 << 19
+#: iterations in all, and so many without a smaller residual
+_ITERATIONS, _STALLED = 300, 40
 #: relative residual of a linear system, and of one far from the steady state
 _SOLVED, _ROUGHLY = 1e-9, 1e-4
 #: residual above which the state is far from steady
@@ -36,6 +37,7 @@ _AIM, _MOST = 0.4, 0.8
 _NEGATIVE = 0.02
 #: factor by which the time step of the continuation grows, at least and at most, and shrinks
 _SLOWEST, _FASTEST, _SHORTER = 1.3, 10.0, 0.3
+_TRIES = 30
 #: sizes at the start, exponentially distributed
 _MEAN, _FIRST = 8.0, 256
 #: tolerance that decides on the number of sizes, and far from the steady state
@@ -178,27 +180,28 @@ class _Search:
         self.equations = Equations(model, factory, len(self.n), self.mass)
         self.started = time.perf_counter()
         self.near_steady = guess is not None
+        #: whether there is no room for what moves to larger sizes
+        self.full = False
 
     def run(self, tolerance: float) -> SteadyState:
         """Return the steady state."""
-        step = 0.0
+        step, best = 0.0, (np.inf, 0)
         for iteration in range(_ITERATIONS):
             self.n *= self.mass / float(self.n @ self.equations.sizes)
             near = Linearisation(self.equations, self.n)
-            residual = float(np.abs(near.rates) @ near.sizes) / near.turnover
-            if not np.isfinite(residual):
+            self.residual = residual = float(np.abs(near.rates) @ near.sizes) / near.turnover
+            self._tell(iteration)
+            best = min(best, (residual, iteration))
+            if not np.isfinite(residual) or iteration - best[1] > _STALLED or self.full:
                 break
-            self._tell(iteration, residual)
-            if residual <= tolerance and not self._grow(_WINDOW_TOLERANCE, near.scale):
+            done = residual <= tolerance and not self._grow(_WINDOW_TOLERANCE, near.scale)
+            if done and not self.full:
                 return SteadyState(self.model, self.n, residual, iteration)
-            if step == 0.0:
-                step = (1e3 if self.near_steady else 1.0) / near.scale
+            step = step or (1e3 if self.near_steady else 1.0) / near.scale
             if residual > tolerance:
                 # no better than Newton's method can make of it, nor than is needed
-                enough = float(
-                    np.clip(max(residual, 0.03 * tolerance / residual), _SOLVED, _ROUGHLY)
-                )
-                step = self._advance(near, step, enough)
+                enough = max(residual, min(0.03 * tolerance / residual, 1e-6))
+                step = self._advance(near, step, float(np.clip(enough, _SOLVED, _ROUGHLY)))
                 rough = residual > _FAR
                 self._grow(_ROUGH_TOLERANCE if rough else _WINDOW_TOLERANCE, near.scale)
         raise self._failure()
@@ -206,8 +209,8 @@ class _Search:
     def _advance(self, near: Linearisation, step: float, tolerance: float) -> float:
         """Take a step, shorter if it changes too much; return the length of the next one."""
         number, mass = float(self.n.sum()), self.mass
-        while True:
-            change = near.solve(1.0 / step, near.rates, tolerance)
+        for _ in range(_TRIES):
+            change = near.solve(1.0 / step, near.rates, tolerance, mass=True)
             new = self.n + change
             share = max(
                 float(np.abs(change).sum()) / number, float(np.abs(change) @ near.sizes) / mass
@@ -216,32 +219,40 @@ class _Search:
             if share <= _MOST and negative <= _NEGATIVE:
                 break
             step *= _SHORTER
+        else:
+            raise self._failure()
         self.n = np.maximum(new, 0.0)
         return step * float(np.clip(_AIM / max(share, 1e-300), _SLOWEST, _FASTEST))
 
     def _grow(self, tolerance: float, scale: float) -> bool:
         """Add sizes if too much flows over the edge in a time ``1 / scale``; return whether so."""
-        window = Window(self.window or _LIMIT, 2.0, tolerance, self.window is not None)
+        window = Window(self.window or 2 * _LIMIT, 2.0, tolerance, self.window is not None)
         operator = self.equations.operator
         operator.prepare(self.n)
         share = window.share(self.n, self.equations.shares(0.0)[1] * operator.beyond(self.n))
         count = window.next(len(self.n), share, 1.0 / scale, 0.0)[0]
+        self.full = count > len(self.n) >= _LIMIT
+        count = count if self.window else min(count, _LIMIT)
         more = count - len(self.n)
         if more > 0:
             self.n = np.pad(self.n, (0, more))
             self.equations.resize(count)
         return more > 0
 
-    def _tell(self, iteration: int, residual: float) -> None:
+    def _tell(self, iteration: int) -> None:
         if self.progress is not None:
             seconds = time.perf_counter() - self.started
-            self.progress(SteadyProgress(iteration, residual, len(self.n), seconds))
+            self.progress(SteadyProgress(iteration, self.residual, len(self.n), seconds))
 
     def _failure(self) -> SolverError:
+        reason = (
+            "mass moves to ever larger sizes: is there a process that brings back enough of it to "
+            "small ones?"
+            if self.full
+            else f"the residual stays at {self.residual:.2g}: raise tolerance, or give a guess"
+        )
         return SolverError(
-            f"no steady state found with up to {len(self.n)} sizes: is there a process that brings "
-            "back small sizes, such as shattering?",
-            np.inf,
+            f"no steady state found with up to {len(self.n)} sizes; {reason}", np.inf
         )
 
 
