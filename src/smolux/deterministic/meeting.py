@@ -13,7 +13,6 @@ Float = NDArray[np.float64]
 
 #: the mass of what transforms give may be off by this share, as rounding
 _ROUNDING = 1e-10
-_LEAST = float(np.finfo(float).tiny)
 
 
 class Meeting:
@@ -76,6 +75,8 @@ class Meeting:
             return gain, (np.maximum(number, 0.0), np.maximum(mass, 0.0))
         number = self.beyond.sum(axis=1)
         mass = self.beyond @ (self._sizes + self._sizes[-1])
-        factor = self.mass / np.maximum(inside + mass, _LEAST)
+        whole = inside + mass
+        near = np.abs(whole - self.mass) < self.mass
+        factor = np.divide(self.mass, whole, out=np.ones_like(whole), where=near)
         factor = np.where(np.abs(factor - 1.0) <= _ROUNDING, factor, 1.0)
         return factor[:, None] * gain, (factor * number, factor * mass)
