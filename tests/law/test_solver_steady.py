@@ -82,7 +82,7 @@ def test_fragmentation():
 def test_solutions_end_in_the_steady_state(kernel, process):
     case = sx.Model(kernel, [sx.processes.Aggregation(), process])
     state = steady_state(case)
-    ds = sx.solve(case, [60.0], tolerance=1e-9)
+    ds = sx.solve(case, [60.0])
     found = ds["moment"].values[0, 0]
     for order in range(4):
         assert state.moment(order) == pytest.approx(found[order], rel=1e-7)

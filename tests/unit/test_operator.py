@@ -173,7 +173,7 @@ def test_solution_with_a_rare_pair():
     start = sx.initial.from_sizes({400: 0.5, 601: 0.5})
     model = sx.Model(RARE["a sum that the function names"], initial=start)
     with pytest.warns(sx.SmoluxWarning, match="all pairs are summed"):
-        ds = sx.solve(model, [1.0], largest=1100)
+        ds = sx.solve(model, [1.0], window=1100)
     assert ds["number_density"].item() == pytest.approx(0.5 + 1 / 3, abs=1e-8)
 
 
