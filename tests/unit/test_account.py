@@ -21,14 +21,16 @@ K1 = sx.kernels.Constant()
 
 def test_entries_add_up_to_what_is_missing():
     account = Account(1e-8, 2.0, 5.0)
-    account.add(Entry(2.0, 1.5, -0.5, -0.5), Entry(5.0, 5.0, 0.0, 0.0))
+    nothing = Entry(5.0, 5.0, 0.0, 0.0, 0.0)
+    account.add(Entry(2.0, 1.5, -0.5, -0.5, -0.5), nothing)
     assert account.problem is None
-    account.add(Entry(1.5, 1.25 + 1e-7, -0.25, -0.25), Entry(5.0, 5.0, 0.0, 0.0))
+    account.add(Entry(1.5, 1.25 + 1e-7, -0.25, -0.25, -0.25), nothing)
     assert account.number == pytest.approx(5e-8)
     assert account.problem is None
-    account.add(Entry(1.25, 1.0 + 4e-7, -0.25, -0.25), Entry(5.0, 5.0, 0.0, 0.0))
+    account.add(Entry(1.25, 1.0 + 4e-7, -0.25, -0.25, -0.25), nothing)
     assert "number of particles" in account.problem
-    assert not account.closes(Entry(1.0, 1.0, 0.0, 1e-7))
+    assert account.closes(nothing)
+    assert not account.closes(nothing, Entry(1.0, 1.0, 0.0, 1e-7, 0.0))
 
 
 @pytest.mark.parametrize("share", [1e-3, -1e-3, 1e-6])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-#: by so many tolerances number and mass may differ from the account in the end, and by so many the
-#: terms of a step from what processes say that they are
+#: by so many tolerances number and mass may differ from the account in the end, or by one for each
+#: step; and by so many the terms of a step from what processes say that they are
 _CLOSED, _STEP = 10.0, 1.0
 
 
@@ -19,19 +19,23 @@ class Entry:
         What the densities hold.
     terms : float
         The sum of the terms that the sizes get.
-    account : float
-        What it is by the account of the processes.
+    account_of_terms, account : float
+        What it is by the account of the processes, for the densities that the terms are of, and for
+        those at the end of the iteration.
     """
 
     before: float
     after: float
     terms: float
+    account_of_terms: float
     account: float
 
     @property
     def apart(self) -> float:
         """How far terms and account are apart, relative to what there is."""
-        return abs(self.terms - self.account) / max(abs(self.before), abs(self.after), 1e-300)
+        return abs(self.terms - self.account_of_terms) / max(
+            abs(self.before), abs(self.after), 1e-300
+        )
 
 
 class Account:
@@ -55,10 +59,12 @@ class Account:
         The difference up to now.
     apart : float
         The largest distance of terms and account over a step.
+    steps : int
     """
 
     def __init__(self, tolerance: float, number: float, mass: float) -> None:
         self.number = self.mass = self.apart = 0.0
+        self.steps = 0
         self._tolerance, self._most = tolerance, [number, mass]
 
     def closes(self, *entries: Entry) -> bool:
@@ -69,6 +75,7 @@ class Account:
         """Enter a step."""
         self.apart = max(self.apart, number.apart, mass.apart)
         missing = []
+        self.steps += 1
         for k, entry in enumerate((number, mass)):
             self._most[k] = max(self._most[k], entry.after)
             missing.append((entry.after - entry.before - entry.account) / self._most[k])
@@ -79,7 +86,7 @@ class Account:
     def problem(self) -> str | None:
         """What does not close, if it is more than it may be."""
         for what, found in (("number", self.number), ("mass", self.mass)):
-            if not abs(found) <= _CLOSED * self._tolerance:
+            if not abs(found) <= max(_CLOSED, self.steps) * self._tolerance:
                 return (
                     f"the {what} of particles differs from what the processes make and take by "
                     f"{abs(found):.1e} of all that there was"

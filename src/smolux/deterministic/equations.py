@@ -92,6 +92,10 @@ class Equations:
         self._bands = np.empty((self.count, 0))
         return True
 
+    def closed(self) -> None:
+        """Note that the terms of a step have added up."""
+        self._tilted = False
+
     @property
     def cut(self) -> bool:
         """Whether the window ends where particles leave the system at once."""

@@ -30,6 +30,8 @@ _FIRST_CHANGE = 0.02
 _ENTRY, _ENTRIES = 1e-9, 32
 #: share of the most particles that were ever there, below which there are none
 _NOTHING = 1e-100
+#: steps after which the sums are adapted to the densities again, at the latest
+_PREPARE = 8
 #: no moment is smaller
 _LEAST = float(np.finfo(float).tiny)
 
@@ -277,6 +279,8 @@ class Integrator:
         self._h = max(proposed, self._h) if h < self._h and factor > 1 else proposed
         if count > len(n):
             self._resize(count)
+        elif self.steps % _PREPARE == 0:
+            self.equations.operator.prepare(self.n)
 
     @property
     def _kept(self) -> Float | None:
@@ -287,9 +291,15 @@ class Integrator:
     def _entered(self, step: Step, n: Float, h: float) -> bool:
         """Enter a step into the account; False if its sums over pairs are to be found anew."""
         sizes, totals = self.equations.sizes, Totals.of(step.along)
+        of_rates = Totals.of(step.along_rates)
         flow = h * (TABLEAU.matrix[-1] @ step.rates)
-        number = Entry(float(self.n.sum()), float(n.sum()), float(flow.sum()), totals.number)
-        mass = Entry(float(self.n @ sizes), float(n @ sizes), float(flow @ sizes), totals.mass)
+        number, mass = (
+            Entry(float(self.n @ w), float(n @ w), float(flow @ w), there, last)
+            for w, there, last in (
+                (np.ones_like(sizes), of_rates.number, totals.number),
+                (sizes, of_rates.mass, totals.mass),
+            )
+        )
         if not self.account.closes(number, mass):
             if self.equations.refine(self.n):
                 self.rejected += 1
@@ -297,6 +307,7 @@ class Integrator:
                 return False
             raise self._open(f"{max(number.apart, mass.apart):.1e} in a step")
         self.account.add(number, mass)
+        self.equations.closed()
         return True
 
     def _accept(self, step: Step, n: Float, h: float, end: float) -> None:

@@ -18,7 +18,7 @@ _MAX_ITERATIONS = 10
 #: the iteration error may be this share of the tolerance
 _ITERATION_SHARE = 0.05
 #: mean contraction above which a step is given up, after so many iterations
-_SLOW, _PATIENCE = 0.8, 3
+_SLOW, _PATIENCE = 0.8, 6
 #: ratio of two corrections above which iterates are mixed, of so many before
 _MIXED, _DEPTH = 0.15, 5
 
@@ -57,6 +57,8 @@ class Step:
     rates : ndarray of shape (S, M)
     along : ndarray of shape (Q,)
         Increase of what is integrated along.
+    along_rates : ndarray of shape (Q,)
+        The same for the densities of `rates`, which a last correction has changed since.
     iterations : int
     contraction : float
         The largest ratio of two changes in the iteration.
@@ -66,6 +68,7 @@ class Step:
     error: Float
     rates: Float
     along: Float
+    along_rates: Float
     iterations: int
     contraction: float
 
@@ -165,6 +168,7 @@ def radau_step(
     systems = [_Triangular(diagonal, band, h, value) for value in TABLEAU.values]
     times = t + h * TABLEAU.nodes
     change, previous, first, contraction = guess.copy(), np.inf, 0.0, 0.0
+    before: Float | None = None
     mixing = Mixing(norm.weights(n)) if isinstance(norm, Weighted) else None
     for iteration in range(1, _MAX_ITERATIONS + 1):
         rates, along = problem.rates(times, n + change)
@@ -191,13 +195,18 @@ def radau_step(
         ahead = min(ratio, _SLOW) / (1.0 - min(ratio, _SLOW)) if iteration > 1 else 10.0
         if ahead * size <= enough:
             break
-        previous = size
+        previous, before = size, along
     else:
         return None
+    there, last = along, along
+    if before is not None:
+        # they are those before the last correction, which changes them as the one before it did
+        last = along + min(ratio, 1.0) * (along - before)
     gamma = TABLEAU.embedded
     defect = gamma * h * (start - TABLEAU.at_start @ rates)
     error = _Triangular(diagonal, band, h, gamma).solve(defect).real
-    return Step(change, error, rates, h * (TABLEAU.matrix[-1] @ along), iteration, contraction)
+    sums = (h * (TABLEAU.matrix[-1] @ what) for what in (last, there))
+    return Step(change, error, rates, *sums, iteration, contraction)
 
 
 class Mixing:
