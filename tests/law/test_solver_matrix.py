@@ -33,7 +33,18 @@ AGGREGATION = P.Aggregation()
 CLOSE = 1e-7
 #: seconds of processor time after which a solution is taken never to end
 PATIENCE = 60.0
-BOTH = pytest.mark.parametrize("method", ["direct", "low-rank"])
+slow = pytest.mark.slow
+
+
+def by_method(*quick):
+    """Starts with a method, of which those are not slow; no direct sums that are dear."""
+    return [
+        pytest.param(start, method, id=name, marks=[] if name in quick else slow)
+        for start in STARTS[:-1]
+        for method in ("direct", "low-rank")
+        if method == "low-rank" or start.largest <= 100
+        for name in [f"{start.name} {method}"]
+    ]
 
 
 def solved(model, times, **options):
@@ -134,11 +145,12 @@ def test_reference_with_another_integrator():
 # Closed forms from any start
 
 
-@BOTH
-@pytest.mark.parametrize("start", STARTS[:-1], ids=lambda s: s.name)
+CONSTANT = ["2 direct", "33 direct", "1, few of 60 direct"]
+CONSTANT += [f"{start.name} low-rank" for start in STARTS]
+
+
+@pytest.mark.parametrize(("start", "method"), by_method(*CONSTANT))
 def test_constant_kernel(start, method):
-    if method == "direct" and start.largest > 300:
-        pytest.skip("larger than a direct sum should be")
     times = [0.5, 1.5]
     ds = solved(sx.Model(K1, initial=start.initial), times, method=method)
     n = start.densities(start.largest)
@@ -153,11 +165,17 @@ def test_constant_kernel(start, method):
     np.testing.assert_allclose(ds["n"].values[0, -1], densities, atol=CLOSE)
 
 
-@BOTH
-@pytest.mark.parametrize("start", STARTS[:-1], ids=lambda s: s.name)
+ADDITIVE = [
+    "33 direct",
+    "32 low-rank",
+    "47 low-rank",
+    "1 and 100 low-rank",
+    "exponential 10 low-rank",
+]
+
+
+@pytest.mark.parametrize(("start", "method"), by_method(*ADDITIVE))
 def test_additive_kernel(start, method):
-    if method == "direct" and start.largest > 300:
-        pytest.skip("larger than a direct sum should be")
     n = start.densities(start.largest)
     k = np.arange(1.0, len(n) + 1.0)
     mass, second = float(n @ k), float(n @ k**2)
@@ -169,8 +187,8 @@ def test_additive_kernel(start, method):
     np.testing.assert_allclose(moment(ds, 2), right, rtol=CLOSE)
 
 
-@BOTH
-@pytest.mark.parametrize("size", [22, 23, 24, 33, 50])
+@pytest.mark.parametrize("method", ["direct", "low-rank"])
+@pytest.mark.parametrize("size", [23, 33, *(pytest.param(s, marks=slow) for s in (22, 24, 50))])
 def test_brownian_kernel_knows_no_unit(size, method):
     # of degree 0: only the density decides; spec R2
     model = sx.Model(sx.kernels.Brownian(), initial=I.monodisperse(size=size))
@@ -185,7 +203,7 @@ def test_brownian_kernel_knows_no_unit(size, method):
         I.monodisperse(size=1000),
         I.from_sizes({1: 0.5, 100: 0.5}),
         I.from_sizes(dict.fromkeys(range(95, 106), 1 / 11)),
-        I.lognormal(1000, 1.01),
+        pytest.param(I.lognormal(1000, 1.01), marks=slow),
     ],
     ids=["100", "1000", "1 and 100", "95 to 105", "lognormal 1000, 1.01"],
 )
@@ -194,7 +212,7 @@ def test_large_starts_for_a_long_time(initial):
     np.testing.assert_allclose(number(ds), [2 / 3, 2 / 7, 1 / 6], rtol=CLOSE)
 
 
-@pytest.mark.parametrize("size", [32, 60, 100, 300, 1000])
+@pytest.mark.parametrize("size", [32, 60, 100, 300, pytest.param(1000, marks=slow)])
 def test_shattering_of_large_particles(size):
     # d/dt N = λ M1 N - (1/2 + λ) N^2, whatever the sizes
     ds = solved(with_(P.Shattering(0.1), initial=I.monodisperse(size=size)), [0.5 / size, 1.0])
@@ -306,8 +324,8 @@ def test_source_with_a_narrow_pulse():
 
 
 def test_periodic_source_in_a_slow_system():
-    ds = solved(with_(P.Source(1, varying="max(0, sin(2*pi*t))"), kernel=SLOW), [100])
-    assert ds["mass_in"].values[0, 0] == pytest.approx(100 / math.pi, rel=CLOSE)
+    ds = solved(with_(P.Source(1, varying="max(0, sin(2*pi*t))"), kernel=SLOW), [20])
+    assert ds["mass_in"].values[0, 0] == pytest.approx(20 / math.pi, rel=CLOSE)
 
 
 def box(t):
@@ -355,7 +373,8 @@ def test_pulses_of_other_processes(process):
 )
 def test_source_that_begins_with_nothing(varying, share):
     end = 1.0 if share else 100.0
-    ds = solved(with_(P.Source(2.0, varying=varying), initial=I.empty()), [end])
+    model = with_(P.Source(2.0, varying=varying), kernel=SLOW, initial=I.empty())
+    ds = solved(model, [end])
     assert moment(ds, 1)[0] == pytest.approx(2 * share if share else 72.0, rel=CLOSE)
 
 
@@ -385,8 +404,10 @@ def test_gel_time(kernel, initial):
     assert analysis.gelation(ds).attrs["gel_time"] == pytest.approx(1 / 3, rel=1e-3)
 
 
-@pytest.mark.parametrize("times", [[1.5, 2.0], [0.5, 1.5, 2.0]])
-@pytest.mark.parametrize("kernel", [sx.kernels.Multiplicative(), sx.kernels.formula("i*j")])
+@pytest.mark.parametrize("times", [[1.5, 2.0], pytest.param([0.5, 1.5, 2.0], marks=slow)])
+@pytest.mark.parametrize(
+    "kernel", [sx.kernels.formula("i*j"), pytest.param(sx.kernels.Multiplicative(), marks=slow)]
+)
 def test_gel_fraction_is_of_the_mass_at_the_start(kernel, times):
     with pytest.warns(SmoluxWarning, match="gel"):
         ds = solved(sx.Model(kernel), times)
@@ -417,10 +438,25 @@ FAST = [
     ("lognormal 20, 2", "Brownian", (), "none"),
     ("empty", "ballistic", ("source",), "ramp"),
     ("empty", "constant", ("source of both", "removal above"), "pulse"),
-]  # fmt: skip
+]
+#: those that take longest
+DEAR = [
+    ("20", "constant", ("breakage",), "box"),
+    ("33", "ballistic", (), "none"),
+    ("100", "constant", ("evaporation",), "none"),
+    ("monomers", "ballistic", ("evaporation", "source"), "box"),
+    ("2", "formula", ("scission", "dilution"), "periodic"),
+    ("32", "formula", ("evaporation",), "none"),
+    ("47", "Brownian", ("deposition",), "pulse"),
+    ("1, few of 60", "additive", ("dilution",), "periodic"),
+    ("empty", "constant", ("source of both", "removal above"), "pulse"),
+]
 
 
-@pytest.mark.parametrize("at", range(len(FAST)), ids=lambda k: " ".join(map(str, FAST[k])))
+@pytest.mark.parametrize(
+    "at", [pytest.param(k, marks=slow if c in DEAR else []) for k, c in enumerate(FAST)],
+    ids=[" ".join((c[0], c[1], *c[2], c[3])) for c in FAST],
+)  # fmt: skip
 def test_cells_of_the_matrix(at):
     start, kernel, processes, varying = FAST[at]
     case = cell(start, kernel, *processes, varying=varying)
@@ -440,6 +476,7 @@ TWICE = {
     "open": with_(P.Source({1: 1.0, 90: 0.01}), P.Removal("0.2*sqrt(k)"), initial=I.empty()),
     "pulse": with_(P.Evaporation(0.3), P.Source(1.0, varying="9*exp(-((t-0.3)/0.01)**2)")),
 }
+TWICE_QUICK = [pytest.param(k, marks=[] if k in ("47", "open") else slow) for k in TWICE]
 
 
 def same(ds, exact, tolerance):
@@ -448,7 +485,7 @@ def same(ds, exact, tolerance):
         np.testing.assert_allclose(ds[what] / scale, exact[what] / scale, tolerance, atol=1e-40)
 
 
-@pytest.mark.parametrize("name", TWICE)
+@pytest.mark.parametrize("name", TWICE_QUICK)
 def test_tolerance_is_the_error(name):
     times = [0.2, 0.6]
     exact = solved(TWICE[name], times, tolerance=1e-10)
@@ -457,7 +494,7 @@ def test_tolerance_is_the_error(name):
         same(ds, exact, 10 * tolerance)
 
 
-@pytest.mark.parametrize("name", TWICE)
+@pytest.mark.parametrize("name", TWICE_QUICK)
 def test_window_does_not_matter(name):
     times = [0.2, 0.6]
     chosen = solved(TWICE[name], times)
