@@ -6,6 +6,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special, stats
 
+from smolux.confidence import Sample, mean_interval, quantile, skewed, vague
+
+__all__ = [
+    "ROUNDING",
+    "Sample",
+    "deviation",
+    "mean_interval",
+    "normal_equivalent",
+    "over_replicas",
+    "quantile",
+    "skewed",
+    "vague",
+    "welch",
+]
+
 Float = NDArray[np.float64]
 
 #: relative differences below which two numbers count as the same: sums of doubles in another order
@@ -25,27 +40,8 @@ def over_replicas(values: ArrayLike) -> tuple[Float, Float, Float]:
     count, mean, error : ndarray of shape (...)
         The mean is NaN where nothing was observed, the standard error where fewer than two were.
     """
-    values = np.asarray(values, float)
-    seen = np.isfinite(values)
-    count = seen.sum(axis=0).astype(float)
-    # around the first observation, so that equal values have a spread of exactly zero
-    first = np.take_along_axis(values, np.argmax(seen, axis=0)[None], axis=0)
-    shifted = np.where(seen, values - first, 0.0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = shifted.sum(axis=0) / count
-        square = np.where(seen, (shifted - mean) ** 2, 0.0).sum(axis=0)
-        error = np.where(count > 1, np.sqrt(square / (count - 1) / count), np.nan)
-    return count, mean + first[0], error
-
-
-def quantile(count: ArrayLike, level: float = 0.95) -> Float:
-    """Half width of the two-sided Student interval in standard errors, for `count` replicas.
-
-    NaN for fewer than two.
-    """
-    count = np.asarray(count, float)
-    dof = np.where(count > 1, count - 1, np.nan)
-    return np.asarray(stats.t.ppf(0.5 + level / 2, dof), float)
+    sample = Sample.of(values)
+    return sample.count, sample.mean, sample.error
 
 
 def normal_equivalent(t: ArrayLike, dof: ArrayLike) -> Float:
@@ -77,6 +73,7 @@ def deviation(
     dof: ArrayLike,
     magnitude: ArrayLike,
     certain: ArrayLike = np.inf,
+    sample: Sample | None = None,
 ) -> Float:
     """Deviation in standard deviations of the normal law; NaN where the error is not known.
 
@@ -89,6 +86,9 @@ def deviation(
     certain : array_like
         Replicas without any spread say nothing about the error, so the answer is NaN; but a
         relative difference above `certain` no chance explains, and the answer is infinite.
+    sample : Sample, optional
+        The replicas, if their mean is compared with a number: then their skewness counts, see
+        `smolux.confidence.skewed`.
 
     Returns
     -------
@@ -98,7 +98,8 @@ def deviation(
         *(np.asarray(x, float) for x in (difference, error, dof, magnitude, certain))
     )
     with np.errstate(all="ignore"):
-        z = normal_equivalent(difference / error, dof)
+        t = difference / error
+        z = normal_equivalent(t if sample is None else skewed(t, sample), dof)
     size, scale = np.abs(difference), np.abs(magnitude)
     with np.errstate(invalid="ignore"):
         beyond = np.where(size > certain * scale, np.copysign(np.inf, difference), np.nan)
