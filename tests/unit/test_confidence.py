@@ -81,7 +81,7 @@ def test_a_variance_of_a_law_with_a_tail_holds_or_is_called_doubtful() -> None:
     sample = Sample.of(drawn("exponential", 8))
     lower, upper = variance_interval(sample)
     assert covered((lower, upper), 1.0) > 0.87  # without kurtosis 0.78, without skewness 0.85
-    assert 0.3 < variance_vague(sample).mean()
+    assert variance_vague(sample).mean() > 0.3
     assert variance_vague(Sample.of(drawn("normal", 8))).mean() < 0.05
 
 

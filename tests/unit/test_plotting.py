@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import smolux as sx
 from smolux import plotting
-from smolux.analysis.statistics import Sample, mean_interval, over_replicas
+from smolux.analysis.statistics import Sample, mean_interval
 from smolux.plotting.distribution import Classes
 
 TIMES = np.concatenate([[0.0], np.geomspace(0.1, 50, 9)])

@@ -121,39 +121,3 @@ def welch(error_a: ArrayLike, count_a: ArrayLike, error_b: ArrayLike, count_b: A
         part_a = np.where(a > 0, a**2 / (np.asarray(count_a, float) - 1), 0.0)
         part_b = np.where(b > 0, b**2 / (np.asarray(count_b, float) - 1), 0.0)
         return np.asarray((a + b) ** 2 / (part_a + part_b), float)
-
-
-def joint_test(z: Float, rows: Float) -> tuple[float, float, float]:
-    """Test many correlated deviations at once.
-
-    If nothing differs, the sum ``Q = sum z**2`` over entries with correlation matrix C has the
-    cumulants ``tr C``, ``2 tr C**2``, ``8 tr C**3``. It is compared with the chi-square law shifted
-    and stretched to the same three. C is estimated from the scatter of the replicas, which for a
-    small sample makes its powers too large and the test careful. In trials, equal laws are rejected
-    no more often than they should be at p = 0.05, and at most three times as often at p = 0.001.
-
-    Parameters
-    ----------
-    z : ndarray of shape (m,)
-        Standard normal deviates.
-    rows : ndarray of shape (R, m)
-        Deviations of the replicas from their mean, scaled so that each column has the sum of
-        squares one.
-
-    Returns
-    -------
-    p, x, f : float
-        Probability of a larger Q; the chi-square that stands for it and its degrees of freedom, at
-        most those that the replicas have.
-
-    References
-    ----------
-    J. P. Imhof, Biometrika 48, 419 (1961), doi:10.1093/biomet/48.3-4.419, section 4 (Pearson's
-    three-moment approximation).
-    """
-    # the Gram matrix of the replicas has the eigenvalues of C, and is small
-    eigenvalues = np.linalg.eigvalsh(rows @ rows.T)
-    squares, cubes = float(np.sum(eigenvalues**2)), float(np.sum(eigenvalues**3))
-    f = squares**3 / cubes**2
-    x = (float(np.sum(z**2)) - len(z)) * float(np.sqrt(f / squares)) + f
-    return float(stats.chi2.sf(x, f)), x, f
