@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -237,17 +237,25 @@ def _least(sample: Sample) -> Float:
     return np.minimum(0.5 * (sample.count - 1.0), 10.0)
 
 
-def enlarged(sample: Sample, wanted: float, sure: float = 0.8) -> Float:
+def enlarged(sample: Sample, wanted: ArrayLike, sure: float = 0.8) -> Float:
     """Estimate how many samples a mean needs for a half width `wanted`.
 
     The variance is taken at the end of its one-sided interval, so that they are enough with the
-    probability `sure`.
+    probability `sure`; skewness and Student's law as they will be with so many.
     """
     from scipy import stats
 
-    nu = freedom(sample)
-    lower, upper = mean_interval(sample)
-    half = np.fmax(upper - sample.mean, sample.mean - lower)
+    nu, wanted = freedom(sample), np.asarray(wanted, float)
     with np.errstate(all="ignore"):
-        allowance = nu / stats.chi2.ppf(1.0 - sure, nu)
-        return np.asarray(sample.count * (half / wanted) ** 2 * np.fmax(allowance, 1.0), float)
+        variance = sample.variance * np.fmax(nu / stats.chi2.ppf(1.0 - sure, nu), 1.0)
+        count = np.asarray(4.0 * variance / np.square(wanted))
+        for _ in range(8):  # each halves what is missing, and more
+            then = replace(sample, count=np.fmax(count, _PEAKED), variance=variance)
+            count = then.count * (half_width(then) / wanted) ** 2
+    return np.asarray(count, float)
+
+
+def half_width(sample: Sample) -> Float:
+    """Return the length of the longer side of the 95 % interval of a mean."""
+    lower, upper = mean_interval(sample)
+    return np.fmax(upper - sample.mean, sample.mean - lower)

@@ -174,7 +174,7 @@ def simulate(
     if executor is not None and not isinstance(executor, ThreadPoolExecutor):
         return told(Elsewhere(plan, executor, progress, workers_of(executor), planned).finish())
     workers = max(1, cores() // plan.subvolumes)
-    groups = [start(plan, *part) for part in plan.groups(workers)]
+    groups = [start(plan, *part) for part in plan.begin(workers)]
     file = None if checkpoint is None else Path(checkpoint).expanduser()
     run = Threads(
         plan, groups, executor, progress, file, checkpoint_every, time_limit, workers, planned

@@ -89,6 +89,31 @@ def test_nothing_seen_is_no_proof_of_nothing():
     assert np.all(start == 0)
 
 
+def test_what_happens_without_a_collision_is_no_certainty():
+    ds = synthetic.constant_dataset(particles=200)
+    ds["collisions"] *= 0.0
+    ds["events"] *= 0.0
+    none = sx.summary(ds, sizes=(50,))["n"].sel(size=50, time=0.5, statistic=["lower", "upper"])
+    assert np.all(none == 0)
+    ds["events"][:, 1] = 3.0  # as evaporation alone does
+    none = sx.summary(ds, sizes=(50,))["n"].sel(size=50, time=0.5, statistic=["lower", "upper"])
+    assert np.isnan(none).all()
+
+
+def test_a_density_of_few_clusters_has_the_interval_of_a_count():
+    """Sizes of which 1 to 30 are seen in all replicas: 95 %, where Student's has 60."""
+    rng, expected = np.random.default_rng(2), 0.4
+    ds = synthetic.constant_dataset(times=np.linspace(0.5, 1.0, 500), particles=100)
+    counts = rng.poisson(expected, ds["n"].shape[:2])
+    ds["n"][..., 9] = counts / ds["volume"].values
+    table = sx.summary(ds, sizes=(10,))["n"].sel(size=10)
+    seen = counts.sum(axis=0) > 0
+    lower, upper = (table.sel(statistic=s).values[seen] for s in ("lower", "upper"))
+    truth = expected / 100
+    assert 0.92 < np.mean((lower <= truth) & (truth <= upper)) < 0.99
+    assert not table.sel(statistic="doubtful").values[seen].any()
+
+
 def test_replicas_that_did_not_reach_the_end():
     ds = synthetic.constant_dataset()
     for name in ("number_density", "moment", "n"):
