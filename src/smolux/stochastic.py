@@ -105,9 +105,10 @@ def simulate(
         Wall seconds after which the run stops with what was reached: the attribute ``complete`` of
         the result is then 0, and ``stopped`` and a warning say how to go on.
     target_error : float, optional
-        Replicas are added to the first `replicas`, at least 8, until the half width of the 95 %
-        interval of the `target` over its mean is at most this at every output time. The result is
-        that of a run with so many replicas from the start, bit for bit.
+        As many replicas as make the half width of the 95 % interval of the `target` over its mean
+        at most this at every output time. How many is chosen by pilots, `replicas` at first and at
+        least 8, that are no part of the result, so that its mean has no bias. The result is that of
+        a run with so many replicas from the start, bit for bit.
     target : str
         What `target_error` and ``weighting="auto"`` are about: ``"number_density"``,
         ``"largest"``, ``"M2"`` (any of the `orders`) or ``"n_5"`` (any size).

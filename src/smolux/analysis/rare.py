@@ -41,7 +41,11 @@ class Rare:
         if is_deterministic(ds) or ds.attrs.get("weighting", "number") != "number":
             return None
         volume = ds["volume"].transpose("replica", "time").values
-        volume = volume.reshape(*volume.shape, *[1] * (values.ndim - 2))
+        return cls.counted(values, volume.reshape(*volume.shape, *[1] * (values.ndim - 2)))
+
+    @classmethod
+    def counted(cls, values: Float, volume: Float) -> Rare:
+        """Count the clusters of densities in replicas, along the first axis, of these volumes."""
         seen = np.isfinite(values)
         counts = np.where(seen, values * volume, 0.0)
         total = counts.sum(axis=0)
