@@ -20,7 +20,7 @@ _TAIL = 10.0
 #: 800
 _FAR = 800.0
 #: relative standard error of a positive mean beyond which its law cannot be judged
-_VAGUE = 0.25
+_VAGUE = 0.2
 #: fewest samples of which a skewness can be taken, and of which a kurtosis
 _SKEWED, _PEAKED = 3, 4
 #: clusters in all replicas together up to which their number counts as one of Poisson's law
@@ -167,7 +167,7 @@ def mean_interval(sample: Sample, level: float = 0.95) -> tuple[Float, Float]:
 def vague(sample: Sample) -> NDArray[np.bool_]:
     """Say where no law can be judged, and so no interval promised.
 
-    With two or three samples, and where the standard error of the mean is above a quarter of it:
+    With two or three samples, and where the standard error of the mean is above a fifth of it:
     a positive quantity that scatters so much is skewed beyond what its samples show.
     """
     with np.errstate(invalid="ignore"):

@@ -111,7 +111,10 @@ def test_a_density_of_few_clusters_has_the_interval_of_a_count():
     lower, upper = (table.sel(statistic=s).values[seen] for s in ("lower", "upper"))
     truth = expected / 100
     assert 0.92 < np.mean((lower <= truth) & (truth <= upper)) < 0.99
-    assert not table.sel(statistic="doubtful").values[seen].any()
+    # one or two clusters: other times there would have been none, and no interval
+    doubtful = table.sel(statistic="doubtful").values == 1
+    assert doubtful[seen][counts.sum(axis=0)[seen] <= 2].all()
+    assert np.mean(doubtful[counts.sum(axis=0) > 2]) < 0.03  # in clumps, by chance
 
 
 def test_replicas_that_did_not_reach_the_end():

@@ -46,7 +46,7 @@ def _mean(x: np.ndarray, true: float, density: bool) -> list[float]:
         low, high = rare.interval()
         lower, upper = np.where(rare.few, low, lower), np.where(rare.few, high, upper)
         lower = np.where(sample.mean == 0, np.nan, lower)
-        doubtful &= ~rare.few & (sample.mean > 0)
+        doubtful = np.where(rare.few, rare.doubtful, doubtful)[sample.mean > 0]
     return [_share((lower, upper), true), float(doubtful.mean()), plain]
 
 

@@ -15,6 +15,8 @@ from .reference import is_deterministic
 
 Float = NDArray[np.float64]
 
+#: clusters from which on an interval is promised
+_TOLD = 2.5
 #: probability of a larger scatter below which clusters are taken to come in clumps
 _CLUMPED = 0.01
 
@@ -54,6 +56,11 @@ class Rare:
         few = (total > 0.5) & (total <= RARE * clump)
         with np.errstate(invalid="ignore", divide="ignore"):
             return cls(few, total / clump, exposure / clump)
+
+    @property
+    def doubtful(self) -> NDArray[np.bool_]:
+        """Where a size was seen once or twice only: other times it would not have been seen."""
+        return self.few & (self.total < _TOLD)
 
     def interval(self) -> tuple[Float, Float]:
         """Return the 95 % interval of the density."""

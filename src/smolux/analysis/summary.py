@@ -32,8 +32,8 @@ _MEANINGS = {
     "the same probability, with the same allowance for skewness; NaN where the replicas show no "
     "spread",
     "replicas": "number of replicas in the mean",
-    "doubtful": "1 where there are too few replicas to promise 95 %: two or three, or a standard "
-    "error above a quarter of the mean",
+    "doubtful": "1 where there are too few replicas to promise 95 %: two or three, a standard "
+    "error above a fifth of the mean, or a size of which one or two clusters were seen",
 }
 
 _BIAS = (
@@ -100,7 +100,7 @@ def _of_variable(ds: xr.Dataset, exact: xr.Dataset | None, name: str) -> xr.Data
         ends = (error, rare.error()), *zip((lower, upper), rare.interval(), strict=True)
         error, lower, upper = (np.where(few, b, a) for a, b in ends)
         sigmas = np.where(few, rare.sigmas(finite), sigmas)
-        doubtful &= ~few
+        doubtful = np.where(few, rare.doubtful, doubtful)
     values = np.stack([mean, error, lower, upper, known, sigmas, count, doubtful], axis=-1)
     coordinates = {d: ds[d] for d in dims} | {"statistic": list(STATISTICS)}
     return xr.DataArray(values, coordinates, [*dims, "statistic"], attrs=dict(ds[name].attrs))
