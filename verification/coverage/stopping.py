@@ -21,7 +21,7 @@ CASES = (
     ("additive", "M3, t = 1", "M3", 0.2),
     ("additive", "M3, t = 1", "M3", 0.1),
 )
-_TRIALS = 1000
+_TRIALS = 400
 _MOST = 20_000
 
 
