@@ -80,7 +80,7 @@ class _Side:
     def volumes(self) -> Float:
         """Volume of each replica when it was drawn: what has been doubled has kept its noise."""
         volume = self.ds["volume"].transpose("replica", "time").values
-        return np.asarray(np.nanmin(volume, axis=1))
+        return np.asarray(np.fmin.reduce(volume, axis=1), float)
 
     def populated(self, mean: Float) -> NDArray[np.bool_]:
         """Whether densities of shape (time, ...) rest on enough particles; a solver's always do."""
@@ -196,9 +196,7 @@ def _scale(side: _Side, name: str, dims: list[str]) -> Float:
     ds = side.ds
     volume = ds["volume"].mean("replica").values if "volume" in ds else np.ones(ds.sizes["time"])
     volume = volume.reshape(-1, *[1] * (len(dims) - 1))
-    mean = side.values(name, dims)
-    with np.errstate(all="ignore"):
-        mean = np.nanmean(mean, axis=0) if mean.size else mean.sum(axis=0)
+    mean = Sample.of(side.values(name, dims)).mean
     if name != "moment" or "n" not in ds:
         return np.asarray(np.sqrt(np.abs(mean) / volume), float)
     p = 2.0 * ds["order"]
