@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, Executor, ThreadPoolExecutor, wait
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
@@ -19,6 +19,7 @@ from .executors import completed
 from .goal import Trial, Verdict, judge, plan_replicas, shortfall
 from .observe import observable, to_records
 from .plan import PILOT, Plan, check_memory
+from .progress import Progress
 from .replicas import Group
 from .results import to_dataset
 from .subvolumes import Divided, start
@@ -29,42 +30,6 @@ if TYPE_CHECKING:
 _TICK = 0.2
 #: intervals below this share of the mean are rounding, of what is conserved
 _ROUNDING = 1e-12
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a run is.
-
-    Attributes
-    ----------
-    events : int
-        Collisions so far, over all replicas.
-    fraction : float
-        Share of the simulated time that is done, 0 to 1; with a target error, of all replicas that
-        it will take as far as is known, so that it may fall.
-    events_per_second : float
-    seconds_left : float
-        Estimated from the simulated time done so far; NaN when nothing is known yet.
-    compile_seconds : float
-        Spent on compiling, not counted in the rate.
-    bounds_seconds : float
-        Processor time spent on bounds and tables of rates, over all threads.
-    replicas : int
-        Begun so far.
-    error, target_error : float
-        Half width of the 95 % interval of the target over its mean, when last looked at, and what
-        is wanted; NaN if not known.
-    """
-
-    events: int
-    fraction: float
-    events_per_second: float
-    seconds_left: float
-    compile_seconds: float
-    replicas: int = 0
-    error: float = np.nan
-    target_error: float = np.nan
-    bounds_seconds: float = 0.0
 
 
 class Run:

@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike
 
 from . import checkpoint as checkpoints
 from .checks import is_number
-from .driving import Elsewhere, Progress, Threads
+from .driving import Elsewhere, Threads
 from .errors import InputError
 from .executors import adapted, workers_of
 from .methods.base import Method
 from .model import Model
 from .pilot import settled
 from .plan import make_plan
+from .progress import Progress
 from .remembered import spent
 from .resources import cores
 from .results import told
