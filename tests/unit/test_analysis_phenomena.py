@@ -121,7 +121,10 @@ def test_an_equilibrium_of_few_particles_has_no_period():
     model = sx.Model(
         sx.kernels.Constant(), [sx.processes.Aggregation(), sx.processes.Shattering(0.1)]
     )
-    ds = sx.simulate(model, np.arange(0.0, 401.0), particles=500, replicas=8, seed=1, sizes=8)
+    ds = sx.simulate(
+        model, np.arange(0.0, 401.0), method="acceptance-rejection", particles=500, replicas=8,
+        seed=1, sizes=8,
+    )  # fmt: skip
     for start in (0.0, 50.0):
         found = analysis.oscillations(ds, start=start)
         assert not np.isin(found["verdict"].values, ["persistent", "decaying"]).any()
