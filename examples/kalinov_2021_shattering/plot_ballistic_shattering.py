@@ -25,7 +25,7 @@ figure = sx.plot.size_distribution(ds, reference=rates)
 sx.plot.save(figure, "ballistic_shattering.png")
 
 # %%
-# Do they agree? All densities and moments are tested together, with the correlations between them.
+# Do they agree? All densities and moments are tested together, whatever their correlations.
 
 agreement = sx.analysis.compare(ds, rates)
 print(f"p = {agreement.p_value:.2f} over {agreement.entries} densities and moments")

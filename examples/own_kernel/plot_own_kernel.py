@@ -31,4 +31,4 @@ solved = sx.solve(sx.Model(kernel=formula), times)
 figure = sx.plot.moments(simulated, reference=solved)
 sx.plot.save(figure, "own_kernel.png")
 
-print("they agree" if sx.analysis.compare(simulated, solved).agree else "they differ")
+print(sx.analysis.compare(simulated, solved).verdict)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, Executor, ThreadPoolExecutor, wait
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
@@ -16,9 +16,10 @@ import numpy as np
 from . import checkpoint as checkpoints
 from .errors import InputError, Interrupted, OutOfMemoryError, WorkerError
 from .executors import completed
-from .goal import Verdict, judge, shortfall
+from .goal import Trial, Verdict, judge, plan_replicas, shortfall
 from .observe import observable, to_records
-from .plan import Plan, check_memory
+from .plan import PILOT, Plan, check_memory
+from .progress import Progress
 from .replicas import Group
 from .results import to_dataset
 from .subvolumes import Divided, start
@@ -29,42 +30,6 @@ if TYPE_CHECKING:
 _TICK = 0.2
 #: intervals below this share of the mean are rounding, of what is conserved
 _ROUNDING = 1e-12
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a run is.
-
-    Attributes
-    ----------
-    events : int
-        Collisions so far, over all replicas.
-    fraction : float
-        Share of the simulated time that is done, 0 to 1; with a target error, of all replicas that
-        it will take as far as is known, so that it may fall.
-    events_per_second : float
-    seconds_left : float
-        Estimated from the simulated time done so far; NaN when nothing is known yet.
-    compile_seconds : float
-        Spent on compiling, not counted in the rate.
-    bounds_seconds : float
-        Processor time spent on bounds and tables of rates, over all threads.
-    replicas : int
-        Begun so far.
-    error, target_error : float
-        Half width of the 95 % interval of the target over its mean, when last looked at, and what
-        is wanted; NaN if not known.
-    """
-
-    events: int
-    fraction: float
-    events_per_second: float
-    seconds_left: float
-    compile_seconds: float
-    replicas: int = 0
-    error: float = np.nan
-    target_error: float = np.nan
-    bounds_seconds: float = 0.0
 
 
 class Run:
@@ -86,6 +51,11 @@ class Run:
         self.verdict: Verdict | None = None
         self.remarks: list[str] = []
 
+    @property
+    def piloting(self) -> bool:
+        """Whether the groups are pilots, by which the number of replicas is chosen."""
+        return bool(self.groups) and self.groups[0].first >= PILOT
+
     def more(self) -> list[tuple[int, int]]:
         """Replicas that the goal still needs, when all are done; none if it is reached."""
         goal, done = self.plan.goal, self.plan.replicas
@@ -93,17 +63,12 @@ class Run:
             return []
         values, moved = observable(self.plan, self.groups)
         verdict = self.verdict = judge(goal, values, moved)
-        if verdict.following > done:
-            wider = replace(self.plan, replicas=verdict.following)
-            try:
-                check_memory(wider, done)
-            except InputError as error:
-                self.remarks.append(f"no further replicas: {error}")
-            else:
-                self.plan = wider
-                for group in self.groups:
-                    group.release()
-                return wider.groups(self.workers, done)
+        if self.piloting:
+            return self._after_pilots(plan_replicas(goal, values, moved))
+        if verdict.following > done and self._widened(verdict.following, done):
+            for group in self.groups:
+                group.release()
+            return self.plan.groups(self.workers, done)
         if verdict.error > goal.error:
             time_ = self.plan.times[verdict.at]
             self.remarks.append(shortfall(goal, verdict, done, time_))
@@ -114,6 +79,31 @@ class Run:
                 "replicas do not reduce: use more particles"
             )
         return []
+
+    def _after_pilots(self, trial: Trial) -> list[tuple[int, int]]:
+        """Begin more pilots, or the replicas of the result in place of the pilots."""
+        done = self.plan.replicas
+        if trial.pilots > done and self._widened(trial.pilots, done):
+            for group in self.groups:
+                group.release()
+            return self.plan.pilots(self.workers, done)
+        assert self.plan.goal is not None
+        self.groups = []
+        if not self._widened(trial.replicas or self.plan.goal.most, 0):
+            self.plan = replace(self.plan, replicas=self.plan.goal.first)  # as many as the pilots
+        return self.plan.groups(self.workers)
+
+    def _widened(self, replicas: int, done: int) -> bool:
+        """Plan more replicas, of which some are `done`, if there is memory for them."""
+        wider = replace(self.plan, replicas=replicas)
+        try:
+            check_memory(wider, done)
+        except InputError as error:
+            remark = f"no further replicas: {error}"
+            self.remarks += [remark] if remark not in self.remarks else []
+            return False
+        self.plan = wider
+        return True
 
     def report(self, done: float, events: int, rate: float) -> None:
         """Tell progress: replicas that are done, parts of them included."""
@@ -139,6 +129,8 @@ class Run:
         records = to_records(self.plan, self.groups)
         records.attributes["bounds_seconds"] += self.planned
         records.attributes |= attributes
+        if self.piloting:
+            records.attributes["complete"] = False
         records.attributes["wall_seconds"] = time.perf_counter() - self.started
         if self.verdict is not None and records.attributes["complete"]:
             records.attributes["reached_error"] = self.verdict.error
@@ -326,7 +318,7 @@ class Elsewhere(Run):
         WorkerError
             If the workers die again and again.
         """
-        parts = self.plan.groups(self.workers)
+        parts = self.plan.begin(self.workers)
         found: dict[int, Group | Divided] = {}
         try:
             while parts:

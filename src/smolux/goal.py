@@ -12,20 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .checks import whole
+from .confidence import Sample, enlarged, half_width
 from .errors import InputError, did_you_mean
 
 Float = NDArray[np.float64]
 
-#: fewest replicas from which an interval is judged: below, stopping when it happens to be short
-#: makes it too short
+#: fewest replicas from which an interval is judged, see `smolux.confidence`
 FEWEST = 8
+#: pilots for each replica that is needed
+_PILOTS = 0.25
 #: observables with a name of their own; M2 and n_5 stand for any order and size
 TARGETS = ("number_density", "largest", "M2", "n_5")
 
 
 @dataclass(frozen=True)
 class Goal:
-    """Replicas are added until the 95 % interval of an observable is short enough.
+    """As many replicas as make the 95 % interval of an observable short enough.
 
     Attributes
     ----------
@@ -34,7 +36,7 @@ class Goal:
     error : float
         Half width of the interval over the mean that is wanted, at every output time.
     first, most : int
-        Replicas at the start, and at the most.
+        Pilots at the start, and replicas of the result at the least; replicas at the most.
     """
 
     target: str
@@ -75,11 +77,55 @@ class Verdict:
     following: int
 
 
+@dataclass(frozen=True)
+class Trial:
+    """What the pilot replicas say.
+
+    Attributes
+    ----------
+    pilots : int
+        How many pilots there should be; no more than there are if they are enough.
+    replicas : int
+        Replicas of the result.
+    """
+
+    pilots: int
+    replicas: int
+
+
+def plan_replicas(goal: Goal, values: Float, moved: NDArray[np.bool_]) -> Trial:
+    """Say how many replicas it takes, from pilots that will be no part of the result.
+
+    Then their number does not depend on the values of the result, whose mean has no bias and whose
+    interval is that of a fixed number of replicas. They are enough with a probability of 80 %. The
+    pilots are a quarter of the replicas, so that the variance is known well enough for that.
+
+    Parameters
+    ----------
+    goal : Goal
+    values : ndarray of shape (R, T)
+        The observable in the pilots.
+    moved : ndarray of bool, shape (T,)
+        Whether anything has happened in any of them.
+
+    References
+    ----------
+    C. Stein, Ann. Math. Stat. 16, 243 (1945), doi:10.1214/aoms/1177731088, for two stages.
+    """
+    pilots = len(values)
+    verdict = judge(goal, values, moved)
+    wanted = min(verdict.needed, goal.most)
+    if math.isinf(verdict.error):  # too little was seen to say anything
+        return Trial(min(2 * pilots, goal.most), goal.most)
+    most = max(pilots, math.ceil(_PILOTS * goal.most))
+    if pilots < math.floor(_PILOTS * wanted) and pilots < most:
+        # few pilots overrate what it takes, so they are no more than doubled
+        return Trial(min(math.ceil(_PILOTS * wanted), 2 * pilots, most), 0)
+    return Trial(pilots, min(max(math.ceil(wanted), goal.first), goal.most))
+
+
 def judge(goal: Goal, values: Float, moved: NDArray[np.bool_]) -> Verdict:
     """Say how near a goal is, and with how many replicas to look again.
-
-    The number of replicas at least doubles before the target is near, so that there are few looks:
-    each is a chance to stop because the interval happens to be short.
 
     Parameters
     ----------
@@ -89,23 +135,20 @@ def judge(goal: Goal, values: Float, moved: NDArray[np.bool_]) -> Verdict:
     moved : ndarray of bool, shape (T,)
         Whether anything has happened in any replica.
     """
-    from scipy import stats
-
-    replicas = len(values)
-    mean, spread = values.mean(axis=0), values.std(axis=0, ddof=1)
-    half = stats.t.ppf(0.975, replicas - 1) * spread / math.sqrt(replicas)
+    replicas, sample = len(values), Sample.of(values)
+    scale = np.abs(sample.mean)
     with np.errstate(divide="ignore", invalid="ignore"):
-        relative = np.where(half > 0, half / np.abs(mean), 0.0)
+        relative = np.where(sample.variance > 0, half_width(sample) / scale, 0.0)
+        needed = np.where(sample.variance > 0, enlarged(sample, goal.error * scale), 0.0)
     # the same count in every replica, above all none, is luck and no proof of certainty
-    luck = moved & (half == 0) & ((mean == 0) | (goal.size is not None))
-    relative[luck] = np.inf
+    luck = moved & (sample.variance == 0) & ((sample.mean == 0) | (goal.size is not None))
+    relative[luck] = needed[luck] = np.inf
     at = int(np.argmax(relative))
-    error = float(relative[at])
-    needed = replicas * max(error / goal.error, 0.0) ** 2
+    error, most = float(relative[at]), float(needed.max())
     if error <= goal.error:
-        return Verdict(error, at, float(replicas), replicas)
-    following = max(replicas + max(1, replicas // 4), math.ceil(min(needed, 2 * replicas)))
-    return Verdict(error, at, needed, max(replicas, min(following, goal.most)))
+        return Verdict(error, at, max(most, float(FEWEST)), replicas)
+    following = max(replicas + max(1, replicas // 4), math.ceil(min(most, 2 * replicas)))
+    return Verdict(error, at, max(most, replicas + 1.0), max(replicas, min(following, goal.most)))
 
 
 def shortfall(goal: Goal, verdict: Verdict, replicas: int, time: float) -> str:

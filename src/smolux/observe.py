@@ -91,7 +91,7 @@ def observable(plan: Plan, groups: Sequence[Group | Divided]) -> tuple[Float, ND
     """
     assert plan.goal is not None
     scalars = np.concatenate([g.tally.scalars for g in groups])
-    _, particles, collisions, volume, largest, *_ = np.moveaxis(scalars, -1, 0)
+    _, particles, collisions, volume, largest, come, gone = np.moveaxis(scalars, -1, 0)
     values = _number_density(plan, groups, particles, volume)
     if plan.goal.target == "largest":
         values = largest
@@ -104,7 +104,9 @@ def observable(plan: Plan, groups: Sequence[Group | Divided]) -> tuple[Float, ND
         column = plan.orders.index(plan.goal.order)
         sums = [g.tally.counts[:, :, 1:] @ powers + g.tally.sums[..., column] for g in groups]
         values = np.concatenate(sums) / volume
-    return values, (collisions > 0).any(axis=0)
+    events = np.concatenate([g.tally.events for g in groups])
+    moved = (collisions > 0) | (events > 0).any(axis=-1) | (come > 0) | (gone > 0)
+    return values, moved.any(axis=0)
 
 
 def _attributes(plan: Plan, groups: Sequence[Group | Divided]) -> dict[str, object]:

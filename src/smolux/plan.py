@@ -35,6 +35,10 @@ from .windows import inflow
 LEAST = 1000
 
 
+#: the replicas from this number on are pilots, see `smolux.goal`
+PILOT = 2**31
+
+
 @dataclass(frozen=True)
 class Plan:
     """All that decides the outcome of a stochastic run."""
@@ -107,6 +111,14 @@ class Plan:
         octaves = np.int64(1) << np.arange(63)
         before = np.maximum(np.searchsorted(edges, octaves, side="right") - 1, 0)
         return Grid(np.array(self.times), edges, np.array(orders), before)
+
+    def begin(self, workers: int) -> list[tuple[int, int]]:
+        """Return the groups to begin with: pilots if there is a goal, else all replicas."""
+        return self.groups(workers) if self.goal is None else self.pilots(workers)
+
+    def pilots(self, workers: int, start: int = 0) -> list[tuple[int, int]]:
+        """Split as many pilots as there are replicas, with random numbers of their own."""
+        return [(PILOT + first, count) for first, count in self.groups(workers, start)]
 
     def groups(self, workers: int, start: int = 0) -> list[tuple[int, int]]:
         """Split the replicas from `start` on: first and number of each group."""

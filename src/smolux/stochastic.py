@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike
 
 from . import checkpoint as checkpoints
 from .checks import is_number
-from .driving import Elsewhere, Progress, Threads
+from .driving import Elsewhere, Threads
 from .errors import InputError
 from .executors import adapted, workers_of
 from .methods.base import Method
 from .model import Model
 from .pilot import settled
 from .plan import make_plan
+from .progress import Progress
 from .remembered import spent
 from .resources import cores
 from .results import told
@@ -105,9 +106,10 @@ def simulate(
         Wall seconds after which the run stops with what was reached: the attribute ``complete`` of
         the result is then 0, and ``stopped`` and a warning say how to go on.
     target_error : float, optional
-        Replicas are added to the first `replicas`, at least 8, until the half width of the 95 %
-        interval of the `target` over its mean is at most this at every output time. The result is
-        that of a run with so many replicas from the start, bit for bit.
+        As many replicas as make the half width of the 95 % interval of the `target` over its mean
+        at most this at every output time. How many is chosen by pilots, `replicas` at first and at
+        least 8, that are no part of the result, so that its mean has no bias. The result is that of
+        a run with so many replicas from the start, bit for bit.
     target : str
         What `target_error` and ``weighting="auto"`` are about: ``"number_density"``,
         ``"largest"``, ``"M2"`` (any of the `orders`) or ``"n_5"`` (any size).
@@ -174,7 +176,7 @@ def simulate(
     if executor is not None and not isinstance(executor, ThreadPoolExecutor):
         return told(Elsewhere(plan, executor, progress, workers_of(executor), planned).finish())
     workers = max(1, cores() // plan.subvolumes)
-    groups = [start(plan, *part) for part in plan.groups(workers)]
+    groups = [start(plan, *part) for part in plan.begin(workers)]
     file = None if checkpoint is None else Path(checkpoint).expanduser()
     run = Threads(
         plan, groups, executor, progress, file, checkpoint_every, time_limit, workers, planned

@@ -186,7 +186,8 @@ def test_a_case_that_was_changed_is_no_case_to_go_on_with(folder):
 
 
 def test_a_run_with_the_solver_says_whether_they_agree(folder):
-    result = call("run", "small.toml", "--set", "solve.tolerance=1e-6")
+    many = "--set", "solve.tolerance=1e-6", "--set", "run.replicas=8"
+    result = call("run", "small.toml", *many)
     assert "The simulation agrees with the solution of the rate equations" in result.stdout
     solution = smolux.results.load(folder / "small" / "solution.nc")
     assert float(solution["number_density"][0, 1]) == pytest.approx(2 / 3, rel=1e-5)
@@ -254,10 +255,12 @@ def test_check_tells_all_mistakes_with_lines(folder):
 
 
 def test_compare_puts_methods_side_by_side(folder):
-    result = call("compare", "small.toml", "-m", "acceptance-rejection", "-m", "solver")
-    rows = [line for line in result.stdout.splitlines() if line.startswith(" acc")]
-    assert len(rows) == 1
-    assert "agrees" in rows[0]
+    for replicas, words in ((3, "too few replicas"), (8, "agrees")):
+        given = "-s", f"run.replicas={replicas}", "-m", "acceptance-rejection", "-m", "solver"
+        result = call("compare", "small.toml", *given)
+        rows = [line for line in result.stdout.splitlines() if line.startswith(" acc")]
+        assert len(rows) == 1
+        assert words in rows[0]
     assert "the exact solution" in result.stdout
     assert "no scatter" in result.stdout
     assert "did you mean 'inverse'" in call("compare", "small.toml", "-m", "invers", code=2).stderr

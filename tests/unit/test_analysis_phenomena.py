@@ -92,6 +92,44 @@ def test_noise_alone_does_not_oscillate():
     assert np.isnan(found.attrs["period"])
 
 
+def autoregressive(replicas, times, rho, seed):
+    """Noise that forgets what it was by a factor `rho` from time to time."""
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal((times, replicas))
+    y = np.empty_like(noise)
+    y[0] = noise[0] / np.sqrt(1 - rho**2)
+    for k in range(1, times):
+        y[k] = rho * y[k - 1] + noise[k]
+    return y.T
+
+
+@pytest.mark.parametrize("rho", [0.8, 0.95])
+def test_the_noise_of_an_equilibrium_does_not_last(rho):
+    t = np.arange(400.0)
+    found = analysis.oscillations(oscillating(100 + autoregressive(40, 400, rho, 5), t))
+    assert np.isin(found["verdict"].values, ["noise", "none", "undecided"]).mean() >= 0.95
+    assert np.count_nonzero(found["verdict"] == "noise") > 10
+    # the same noise on top of a swing of its own size, whose phase drifts
+    drift = np.cumsum(np.random.default_rng(6).standard_normal((10, 400)) * 0.05, axis=1)
+    swing = 3 * np.sin(2 * np.pi * t / 33 + drift) / np.sqrt(1 - rho**2)
+    found = analysis.oscillations(oscillating(100 + swing + autoregressive(10, 400, rho, 7), t))
+    assert np.all(found["chance"] < 1e-3)
+
+
+def test_an_equilibrium_of_few_particles_has_no_period():
+    """500 particles under shattering; each replica swings by a tenth of its mean."""
+    model = sx.Model(
+        sx.kernels.Constant(), [sx.processes.Aggregation(), sx.processes.Shattering(0.1)]
+    )
+    ds = sx.simulate(
+        model, np.arange(0.0, 401.0), method="acceptance-rejection", particles=500, replicas=8,
+        seed=1, sizes=8,
+    )  # fmt: skip
+    for start in (0.0, 50.0):
+        found = analysis.oscillations(ds, start=start)
+        assert not np.isin(found["verdict"].values, ["persistent", "decaying"]).any()
+
+
 def test_too_few_times():
     ds = oscillating(np.ones((1, 10)), np.arange(10.0))
     with pytest.raises(sx.InputError, match="fewer than 5"):
@@ -140,13 +178,47 @@ def random_graph(particles, times, replicas, seed=1):
     )
 
 
-def test_gel_time_and_gel_of_the_multiplicative_kernel():
-    found = analysis.gelation(random_graph(20_000, np.linspace(0, 2, 41), 6))
-    assert found.attrs["gel_time"] == pytest.approx(1.0, abs=0.1)
-    assert 0 < found.attrs["gel_time_error"] < 0.05
+@pytest.mark.parametrize("times", [9, 41])
+def test_gel_time_and_gel_of_the_multiplicative_kernel(times):
+    """Whatever the output times are, one is within two of the errors that are given."""
+    found = analysis.gelation(random_graph(20_000, np.linspace(0, 2, times), 6))
+    error = found.attrs["gel_time_error"]
+    assert found.attrs["gel_time"] == pytest.approx(1.0, abs=2 * error)
+    assert found.attrs["gel_time_grid"] == pytest.approx(2 / (times - 1) / np.sqrt(12))
+    # N**(-1/3): of the moments of the orders 2 and 3, or of the number of clusters without them
+    assert found.attrs["gel_time_finite"] == pytest.approx(
+        found.attrs["gel_time"] * 20_000 ** (-1 / 3), rel=1e-6
+    )
+    assert error < (0.06 if times == 41 else 0.1)
     share = found["gel_fraction"].mean("replica")
     assert float(share[0]) == 1 / 20_000
     assert float(share[-1]) == pytest.approx(1 - 0.203187869980, abs=0.01)
+
+
+def test_the_end_of_a_finite_system_is_no_gel():
+    times = np.linspace(0, 200, 101)
+    ds = synthetic.constant_dataset(particles=1000, times=times)
+    assert np.isnan(analysis.gelation(ds)["gel_time"]).all()
+    # also where nobody knows whether the kernel gels
+    ds.attrs["model"] = "unknown"
+    assert np.isnan(analysis.gelation(ds)["gel_time"]).all()
+
+
+@pytest.mark.filterwarnings("ignore:.*after gelation this is the gel")
+def test_gel_and_mass_that_is_removed():
+    """K = i j from triplets gels at 1/3; n and M2 before, and the mass of the gel behind."""
+    model = sx.Model(kernel=sx.kernels.Multiplicative(), initial=sx.initial.monodisperse(1 / 3, 3))
+    late = sx.solve(model, np.array([0.4, 0.5, 0.6]), sizes=8, max_size=1024)
+    share = analysis.gel_fraction(late).values[0]
+    # Stockmayer: the mass of the sol falls as 1 / (3 t)
+    assert np.allclose(share, 1 - 1 / (3 * late["time"].values), atol=1e-3)
+    for times in (np.linspace(0, 0.33, 12), np.linspace(0, 0.5, 51)):
+        found = analysis.gelation(sx.solve(model, times, sizes=8, max_size=1024)).attrs
+        assert found["gel_time"] == pytest.approx(1 / 3, abs=1e-4)
+        assert abs(found["gel_time"] - 1 / 3) < 4 * found["gel_time_error"] + 1e-5
+    removal = [sx.processes.Aggregation(), sx.processes.Removal("0.5")]
+    gone = sx.solve(sx.Model(sx.kernels.Constant(), removal), [0.0, 1.0, 2.0])
+    assert np.allclose(analysis.gel_fraction(gone), 0.0, atol=1e-7)
 
 
 def test_gel_time_from_rate_equations():

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from smolux.analysis.joint import Rows, score_test, total_test
 from smolux.analysis.statistics import (
     deviation,
-    joint_test,
     normal_equivalent,
     over_replicas,
     quantile,
@@ -72,35 +72,53 @@ def test_welch():
     assert welch(ea, na, 0.0, 1) == pytest.approx(3)
 
 
-def trial(rng, root, replicas, other):
+def trial(rng, root, replicas, other, shift=0.0, volume=1.0):
     """Compare two samples of the same correlated law; `other` 0 for an exact mean."""
     m = len(root)
-    samples = [rng.standard_normal((r, m)) @ root.T for r in (replicas, other) if r]
-    counts, means, errors = zip(*map(over_replicas, samples), strict=True)
-    if not other:
-        counts, means, errors = (*counts, 1), (*means, 0.0), (*errors, 0.0 * errors[0])
-    error = np.hypot(*errors)
-    z = deviation(means[0] - means[1], error, welch(errors[0], counts[0], errors[1], counts[1]), 1)
-    scaled = [(s - s.mean(0)) / (error * np.sqrt(len(s) * (len(s) - 1))) for s in samples]
-    return joint_test(z, np.concatenate(scaled))[0]
+    first = shift + rng.standard_normal((replicas, m)) @ root.T
+    if other:
+        second = rng.standard_normal((other, m)) @ root.T / np.sqrt(volume)
+        rows = Rows.of_two(first, second, (np.ones(replicas), np.full(other, volume)))
+    else:
+        rows = Rows.of_one(first, np.zeros(m), np.ones(replicas))
+    assert rows.freedom == replicas + other - (2 if other else 1)
+    scale = np.linspace(0.5, 2.0, m)
+    return score_test(rows, scale), total_test(rows, scale)[0]
 
 
-@pytest.mark.parametrize(("replicas", "other"), [(3, 0), (8, 0), (8, 8), (2, 2)])
-@pytest.mark.parametrize("correlation", [0.0, 0.7, 0.97])
-def test_joint_test_rarely_rejects_equal_laws(replicas, other, correlation):
+def root_of(correlation, m=25):
+    k = np.arange(m)
+    return np.linalg.cholesky(correlation ** np.abs(k[:, None] - k) + 1e-12 * np.eye(m))
+
+
+@pytest.mark.parametrize(("replicas", "other"), [(3, 0), (8, 0), (8, 8), (3, 8)])
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
+def test_joint_tests_have_their_level(replicas, other, correlation):
     rng = np.random.default_rng(11)
-    k = np.arange(25)
-    root = np.linalg.cholesky(correlation ** np.abs(k[:, None] - k) + 1e-12 * np.eye(25))
-    p = np.array([trial(rng, root, replicas, other) for _ in range(1000)])
-    assert np.mean(p < 0.05) < 0.07
-    assert np.mean(p < 0.001) < 0.007
-    assert 0.3 < p.mean() < 0.6
+    root, trials = root_of(correlation), 2000
+    volume = 4.0 if replicas != other else 1.0
+    p, total = np.array([trial(rng, root, replicas, other, volume=volume) for _ in range(trials)]).T
+    # one standard deviation of the share is 0.5 %
+    assert abs(np.mean(p < 0.05) - 0.05) < 0.02
+    assert stats.kstest(p, "uniform").pvalue > 1e-4
+    assert np.mean(total < 0.05) < 0.07
+    assert np.mean(total < 0.001) < 0.008
 
 
-def test_joint_test_counts_fully_correlated_entries_once():
-    rng = np.random.default_rng(3)
-    row = rng.standard_normal((8, 1)) @ np.ones((1, 40))
-    rows = (row - row.mean(0)) / np.sqrt(((row - row.mean(0)) ** 2).sum(0))
-    p, chi_square, dof = joint_test(np.full(40, 1.5), rows)
-    assert (chi_square, dof) == pytest.approx((1.5**2, 1))
-    assert p == pytest.approx(2 * stats.norm.sf(1.5))
+def test_the_score_finds_what_all_entries_share():
+    """Two standard errors in each of 25 entries, which no entry shows by itself."""
+    rng = np.random.default_rng(12)
+    found = [trial(rng, root_of(0.3), 8, 0, shift=2 / np.sqrt(8))[0] for _ in range(200)]
+    assert np.mean(np.array(found) < 0.005) > 0.5
+    # with three replicas: a shift that all share by 20 standard errors
+    found = [trial(rng, root_of(0.3), 3, 0, shift=20 / np.sqrt(3)) for _ in range(200)]
+    assert np.mean(np.min(found, axis=1) < 0.0025) > 0.95
+
+
+def test_the_scatter_of_fully_correlated_entries_counts_once():
+    row = np.random.default_rng(3).standard_normal((8, 1)) + 0.5
+    wide = Rows.of_one(np.repeat(row, 40, axis=1), np.zeros(40), np.ones(8))
+    expected = stats.ttest_1samp(row[:, 0], 0.0).pvalue
+    assert score_test(wide, np.ones(40)) == pytest.approx(expected, rel=1e-9)
+    p, _, freedom = total_test(wide, np.ones(40))
+    assert (p, freedom) == pytest.approx((expected, 1))

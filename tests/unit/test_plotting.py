@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import smolux as sx
 from smolux import plotting
-from smolux.analysis.statistics import over_replicas, quantile
+from smolux.analysis.statistics import Sample, mean_interval
 from smolux.plotting.distribution import Classes
 
 TIMES = np.concatenate([[0.0], np.geomspace(0.1, 50, 9)])
@@ -140,15 +140,17 @@ def bars(ax):
     return found
 
 
-def test_moments_show_means_and_student_intervals(many):
+def test_moments_show_means_and_their_intervals(many):
     ax = plotting.moments(many, orders=(2,)).axes[0]
     (x, y, half), *rest = bars(ax)
     assert not rest
-    count, mean, error = over_replicas(many["moment"].sel(order=2).values)
+    sample = Sample.of(many["moment"].sel(order=2).values)
+    mean = sample.mean
+    lower, upper = mean_interval(sample)
     # the start has no place on a logarithmic axis
     assert np.array_equal(x, TIMES[1:])
     assert np.allclose(y, mean[1:])
-    assert np.allclose(half, (quantile(count) * error)[1:])
+    assert np.allclose(half, (upper - lower)[1:] / 2)
     (line,) = [line for line in ax.lines if line.get_linestyle() == "-"]
     assert np.allclose(line.get_ydata(), 1 + line.get_xdata())
 

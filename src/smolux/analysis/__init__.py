@@ -2,7 +2,7 @@
 
 from .balance import mass_balance
 from .by_rates import densities_by_rates
-from .compare import compare
+from .compare import compare, verdict
 from .gathering import format_sweep, sweep_table
 from .gelation import gel_fraction, gelation
 from .moments import moments
@@ -32,4 +32,5 @@ __all__ = [
     "summary",
     "sweep_table",
     "tables",
+    "verdict",
 ]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -14,29 +14,42 @@ from scipy import stats
 from smolux.errors import InputError
 from smolux.results import require
 
+from .joint import Rows, score_test, total_test
 from .reference import exact_dataset, is_deterministic
 from .select import matches
-from .statistics import ROUNDING, deviation, joint_test, over_replicas, welch
+from .statistics import ROUNDING, Sample, deviation, welch
 from .summary import certain_difference, mass_resolution
 
 Float = NDArray[np.float64]
 
-#: the probability below which two results are said to differ
-SIGNIFICANCE = 1e-3
+#: the probability with which equal results are said to differ, and the share of each test in it
+SIGNIFICANCE = 0.01
+_SHARES = {"p_value": 0.5, "p_total": 0.1, "p_largest": 0.4}
 #: the labels of the dimension `statistic`
 STATISTICS = ("first", "second", "difference", "relative", "error", "sigmas")
 #: particles of one size or bin that a density must rest on, for the normal law to hold
 _ENOUGH = 10.0
+#: standard errors that one number must differ by to be found, beyond which replicas are too few
+_BLUNT = 10.0
+#: chance of finding what `found_beyond` says
+_POWER = 0.9
+#: the words for `agree`
+VERDICTS = {1: "agrees", 0: "differs", -1: "untested"}
+TOO_FEW = "too few replicas to tell"
 
 _TESTED = (
     "sigmas: difference of the means over replicas in standard errors (Welch), turned from "
-    "Student's t into the normal deviate of the same probability; an exact solution or a solver "
-    "counts as without error. p_value: the sum of the squares of sigmas over all entries "
-    "(variable, time, order, size or bin with at least 10 particles) against a chi-square law with "
-    "the mean, variance and skewness that this sum has under the correlations seen between the "
-    "replicas (Imhof 1961). p_largest: the largest of sigmas by Bonferroni, which holds for any "
-    "correlation. The results agree if both are above 0.001. A bias of order 1/N of a finite "
-    "population is a difference too."
+    "Student's t into the normal deviate of the same probability, with an allowance for skewness "
+    "(Hall 1992) beside an exact solution or a solver, which count as without error. Entries are "
+    "variable, time, order, size or bin with at least 10 particles. p_value: Student's test of one "
+    "score of all entries, their first principal component (Laeuter 1996), uniform if nothing "
+    "differs. p_total: the sum of squares of all differences over that of the scatter (Dempster "
+    "1958), careful. p_largest: the largest of sigmas by Bonferroni, which holds for any "
+    "correlation. The results differ if p_value is below 0.005, p_total below 0.001 or p_largest "
+    "below 0.004; equal ones do so in about 1 of 100 cases. If not, they agree, unless a single "
+    "number had to be off by more than 10 standard errors to be found (found_beyond, with a chance "
+    "of 90 %): then there are too few replicas to tell. A bias of order 1/N of a finite population "
+    "is a difference too."
 )
 
 
@@ -63,6 +76,11 @@ class _Side:
         values = np.asarray(variable.transpose("replica", *dims).values, float)
         # moments beyond gelation are infinite: there is nothing to compare
         return np.where(np.isfinite(values), values, np.nan)
+
+    def volumes(self) -> Float:
+        """Volume of each replica when it was drawn: what has been doubled has kept its noise."""
+        volume = self.ds["volume"].transpose("replica", "time").values
+        return np.asarray(np.fmin.reduce(volume, axis=1), float)
 
     def populated(self, mean: Float) -> NDArray[np.bool_]:
         """Whether densities of shape (time, ...) rest on enough particles; a solver's always do."""
@@ -101,14 +119,44 @@ def _chosen(
     return chosen
 
 
-def _compare_variable(a: _Side, b: _Side, name: str) -> tuple[xr.DataArray, Float, Float]:
-    """Compare one variable; also the deviates for the joint test, and their rows."""
+@dataclass
+class _Variable:
+    """One variable compared.
+
+    Attributes
+    ----------
+    result : DataArray
+    z : ndarray
+        Deviates of the entries that are tested, NaN for others.
+    values : tuple of ndarray
+        Of both sides, with the replicas first.
+    scale : ndarray
+        What the entries may scatter by, see `_scale`.
+    """
+
+    result: xr.DataArray
+    z: Float
+    values: tuple[Float, Float]
+    scale: Float
+
+    def rows(self) -> tuple[Float, Float, Float]:
+        """Return the entries tested: both sides of shape (R, m), and their scale.
+
+        What some replica has not reached is left out, and what no replica scatters in.
+        """
+        kept = np.isfinite(self.z) & (self.scale > 0)
+        kept &= np.all([np.isfinite(v).all(axis=0) for v in self.values], axis=0)
+        return self.values[0][:, kept], self.values[1][:, kept], self.scale[kept]
+
+
+def _compare_variable(a: _Side, b: _Side, name: str) -> _Variable:
     dims = ["time", *(str(d) for d in a.ds[name].dims if d not in ("replica", "time"))]
-    values = [side.values(name, dims) for side in (a, b)]
-    counts, means, scatter = zip(*map(over_replicas, values), strict=True)
+    values = a.values(name, dims), b.values(name, dims)
+    samples = [Sample.of(each) for each in values]
+    counts, means = [each.count for each in samples], [each.mean for each in samples]
     errors = [
-        np.zeros(mean.shape) if side.deterministic else error
-        for side, mean, error in zip((a, b), means, scatter, strict=True)
+        np.zeros(each.mean.shape) if side.deterministic else each.error
+        for side, each in zip((a, b), samples, strict=True)
     ]
     difference, error = means[0] - means[1], np.hypot(*errors)
     magnitude = np.fmax(np.abs(means[0]), np.abs(means[1]))
@@ -116,26 +164,47 @@ def _compare_variable(a: _Side, b: _Side, name: str) -> tuple[xr.DataArray, Floa
     orders = a.ds["order"].values if "order" in a.ds else np.array([])
     certain = certain_difference(name, orders, dims, resolution)
     dof = welch(errors[0], counts[0], errors[1], counts[1])
-    z = deviation(difference, error, dof, magnitude, certain)
-
-    rows = []
-    for side, table, mean, count in zip((a, b), values, means, counts, strict=True):
-        if not side.deterministic:
-            with np.errstate(all="ignore"):
-                scaled = (table - mean) / (error * np.sqrt(count * (count - 1)))
-            # a replica that was not observed adds nothing
-            rows.append(np.nan_to_num(scaled, nan=0.0, posinf=0.0, neginf=0.0))
+    z = deviation(difference, error, dof, magnitude, certain, _alone(a, b, samples))
     used = (np.isfinite(z) & (error > ROUNDING * magnitude)) | np.isinf(z)
     used &= _chosen(a, b, name, dims, means)
-    residuals = np.concatenate(rows)[:, used] if rows else np.zeros((0, int(used.sum())))
-
     with np.errstate(all="ignore"):
         relative = difference / magnitude
     columns = np.stack([*means, difference, relative, error, z], axis=-1)
     coordinates = {d: a.ds[d] for d in dims} | {"statistic": list(STATISTICS)}
     attributes = {"long_name": a.ds[name].attrs.get("long_name", name)}
     result = xr.DataArray(columns, coordinates, [*dims, "statistic"], name, attributes)
-    return result, np.where(used, z, np.nan), residuals
+    scale = _scale(b if a.deterministic else a, name, dims)
+    return _Variable(result, np.where(used, z, np.nan), values, scale)
+
+
+def _alone(a: _Side, b: _Side, samples: Sequence[Sample]) -> Sample | None:
+    """Return the replicas if only one side has any: then their skewness counts."""
+    if a.deterministic == b.deterministic:
+        return None
+    (sample,) = (s for side, s in zip((a, b), samples, strict=True) if not side.deterministic)
+    if a.deterministic:  # the difference is that of the other side, turned round
+        return replace(sample, skewness=-sample.skewness)
+    return sample
+
+
+def _scale(side: _Side, name: str, dims: list[str]) -> Float:
+    """Return the standard deviation that independent clusters in that volume would have.
+
+    The square is ``sum_k k**(2 p) n_k / V`` for the moment of order p. It is no more than a measure
+    by which entries of all kinds can be put together, and depends on means only.
+    """
+    ds = side.ds
+    volume = ds["volume"].mean("replica").values if "volume" in ds else np.ones(ds.sizes["time"])
+    volume = volume.reshape(-1, *[1] * (len(dims) - 1))
+    mean = Sample.of(side.values(name, dims)).mean
+    if name != "moment" or "n" not in ds:
+        return np.asarray(np.sqrt(np.abs(mean) / volume), float)
+    p = 2.0 * ds["order"]
+    square = (ds["n"] * ds["size"].astype(float) ** p).sum("size")
+    if ds.sizes.get("bin", 0):
+        square = square + xr.where(ds["n_bin"] == 0, 0.0, ds["n_bin"] * ds["bin"] ** p).sum("bin")
+    square = square.mean("replica") if "replica" in square.dims else square
+    return np.asarray(np.sqrt(square.transpose(*dims).values / volume))
 
 
 def _largest(result: xr.Dataset, used: dict[str, Float]) -> tuple[float, str]:
@@ -165,9 +234,12 @@ def compare(first: xr.Dataset, second: xr.Dataset | Literal["exact"]) -> xr.Data
     xarray.Dataset
         For number_density, moment, n and n_bin at what both have in common (times, orders, sizes,
         bins), along the dimension ``statistic``: first, second, difference, relative, error and
-        sigmas. Attributes: ``p_value`` of the joint test with its ``chi_square`` and
-        ``degrees_of_freedom``; ``largest_sigmas``, ``where`` it is and ``p_largest``; ``entries``
-        tested; ``agree`` (1 or 0; -1 if nothing could be tested); ``tested``, what all this means.
+        sigmas. Attributes: ``p_value`` of a joint test; ``p_total`` of another with its
+        ``chi_square`` and ``degrees_of_freedom``; ``largest_sigmas``, ``where`` it is and
+        ``p_largest``; ``entries`` tested; ``agree`` (1 or 0; -1 if that cannot be told) and the
+        same as ``verdict`` in words: agrees, differs, too few replicas to tell, untested;
+        ``found_beyond``, how many standard errors a single number had to be off by to be found with
+        a chance of 90 %; ``tested``, what all this means.
 
     Raises
     ------
@@ -187,31 +259,88 @@ def compare(first: xr.Dataset, second: xr.Dataset | Literal["exact"]) -> xr.Data
         raise InputError("compare: no exact solution is known for the model of this result")
     a, b = _Side.of(first), _Side.of(reference)
     _cut(a, b)
-    parts, used, rows = {}, {}, []
-    for name in ("number_density", "moment", "n", "n_bin"):
-        if name in a.ds and name in b.ds:
-            parts[name], used[name], residuals = _compare_variable(a, b, name)
-            rows.append(residuals)
-    result = xr.Dataset(parts)
-    z = np.concatenate([v[~np.isnan(v)] for v in used.values()])
-    largest, where = _largest(result, used)
-    p, chi_square, f = joint_test(z, np.concatenate(rows, axis=1)) if z.size else (np.nan,) * 3
+    names = [n for n in ("number_density", "moment", "n", "n_bin") if n in a.ds and n in b.ds]
+    parts = {name: _compare_variable(a, b, name) for name in names}
+    result = xr.Dataset({name: part.result for name, part in parts.items()})
+    z = np.concatenate([part.z[~np.isnan(part.z)] for part in parts.values()])
+    largest, where = _largest(result, {name: part.z for name, part in parts.items()})
     p_largest = min(1.0, float(2 * stats.norm.sf(largest)) * z.size) if z.size else np.nan
-    agree = int(min(p, p_largest) > SIGNIFICANCE) if z.size else -1
+    p, total, freedom = _together(a, b, list(parts.values()))
+    beyond = _found_beyond(freedom)
     result.attrs = {
         "p_value": p,
-        "chi_square": chi_square,
-        "degrees_of_freedom": f,
+        "p_total": total[0],
+        "chi_square": total[1],
+        "degrees_of_freedom": total[2],
         "largest_sigmas": largest if z.size else np.nan,
         "where": where,
         "p_largest": p_largest,
         "entries": int(z.size),
-        "agree": agree,
+        "found_beyond": beyond,
         "tested": _TESTED,
     }
-    if not z.size:
+    result.attrs["agree"], result.attrs["verdict"] = verdict(result.attrs)
+    if result.attrs["verdict"] == TOO_FEW:
+        result.attrs["notes"] = (
+            f"Too few replicas to tell: a single number had to be off by {beyond:.2g} standard "
+            "errors to be found with a chance of 90 %; use 8 replicas or more."
+        )
+    elif not z.size:
         result.attrs["notes"] = (
             "Nothing could be tested: neither result has two or more replicas to take an error "
             "from; see the relative differences."
         )
     return result
+
+
+def _together(
+    a: _Side, b: _Side, parts: Sequence[_Variable]
+) -> tuple[float, tuple[float, float, float], int]:
+    """Make both tests of all entries at once, NaN for none; also the freedom of the scatter."""
+    first, second, scale = (
+        np.concatenate(arrays, axis=-1)
+        for arrays in zip(*(part.rows() for part in parts), strict=True)
+    )
+    noisy = [v for v, side in ((first, a), (second, b)) if not side.deterministic]
+    freedom = sum(map(len, noisy)) - max(len(noisy), 1)
+    if not scale.size or freedom < 1:
+        return np.nan, (np.nan,) * 3, 0
+    if len(noisy) == 2:
+        rows = Rows.of_two(first, second, (a.volumes(), b.volumes()))
+    else:
+        side, values, known = (b, second, first[0]) if a.deterministic else (a, first, second[0])
+        rows = Rows.of_one(values, known, side.volumes())
+    return score_test(rows, scale), total_test(rows, scale), freedom
+
+
+def verdict(found: Mapping[str, Any], comparisons: int = 1) -> tuple[int, str]:
+    """Say whether results differ, agree, or whether that cannot be told.
+
+    Parameters
+    ----------
+    found : mapping
+        Attributes of what `compare` returned.
+    comparisons : int
+        How many are made of which none should differ by chance.
+
+    Returns
+    -------
+    agree : int
+        0, 1 or -1.
+    words : str
+    """
+    p = {name: found[name] * comparisons / share for name, share in _SHARES.items()}
+    tested = [each for each in p.values() if each == each]
+    if not tested:
+        return -1, VERDICTS[-1]
+    if min(tested) < SIGNIFICANCE:
+        return 0, VERDICTS[0]
+    return (-1, TOO_FEW) if found["found_beyond"] > _BLUNT else (1, VERDICTS[1])
+
+
+def _found_beyond(freedom: int) -> float:
+    """Return the standard errors that one number must be off by, to be found nearly always."""
+    if not freedom:
+        return np.nan
+    level = SIGNIFICANCE * _SHARES["p_largest"]
+    return float(stats.t.isf(level / 2, freedom) + stats.norm.ppf(_POWER))

@@ -12,8 +12,8 @@ import xarray as xr
 from smolux.errors import InputError
 from smolux.results import require, warnings
 
-from .statistics import over_replicas, quantile
-from .table import aligned
+from .statistics import Sample, mean_interval
+from .table import aligned, pair
 
 #: describe the bins, which may differ in number from point to point
 _BIN_COORDINATES = ("bin_lower", "bin_upper", "bin_width")
@@ -186,9 +186,10 @@ def _cells(values: xr.DataArray, several: bool) -> list[str]:
     reached = np.flatnonzero(np.isfinite(table).any(axis=0))
     if not reached.size:
         return ["-", "-"] if several else ["-"]
-    count, mean, error = over_replicas(table[:, reached[-1]])
-    half = float(quantile(count) * error)
-    cells = [f"{float(mean):.5g}", f"±{half:.2g}" if half == half else "-"]
+    sample = Sample.of(table[:, reached[-1]])
+    lower, upper = mean_interval(sample)
+    _, half = pair(float(sample.mean), float(lower), float(upper))
+    cells = [f"{float(sample.mean):.5g}", half]
     return cells if several else cells[:1]
 
 

@@ -14,6 +14,8 @@ from scipy import signal
 from smolux.checks import numbers
 from smolux.errors import InputError
 
+from .periodicity import chance_of_noise
+from .reference import is_deterministic
 from .select import series
 from .statistics import over_replicas
 
@@ -25,6 +27,8 @@ _ENOUGH = 4
 _LASTING = 0.3
 #: share of the swings that must remain over the whole series for them to count as level
 _LEVEL = 0.9
+#: probability that noise has such a spectrum above which oscillations are taken for noise
+_NOISE = 1e-3
 #: value of F from which on a limit above zero is called for
 _CLEAR = 10.0
 
@@ -159,10 +163,11 @@ class _Found:
     amplitude: float
     limit: float
     contraction: float
+    chance: float
     verdict: str
 
 
-def _find(t: Float, y: Float, prominence: float) -> _Found:
+def _find(t: Float, y: Float, prominence: float, noisy: bool) -> _Found:
     at, value, kind = extrema(t, y, prominence=prominence)
     finite = t[np.isfinite(y)]
     end = float(finite[-1]) if finite.size else np.nan
@@ -175,6 +180,10 @@ def _find(t: Float, y: Float, prominence: float) -> _Found:
         verdict = "none"
     elif end - at[-1] > 2.5 * float(np.median(np.diff(at))):
         verdict = "decaying"  # nothing has been seen for more than a period
+    seen = np.isfinite(y)
+    chance = chance_of_noise(t[seen], y[seen]) if noisy else np.nan
+    if chance > _NOISE and verdict in ("persistent", "decaying"):
+        verdict = "noise"
     return _Found(
         at=at,
         value=value,
@@ -183,6 +192,7 @@ def _find(t: Float, y: Float, prominence: float) -> _Found:
         amplitude=float(np.mean(swings[late])) / 2 if swings[late].size else np.nan,
         limit=limit / 2,
         contraction=ratio**2,
+        chance=chance,
         verdict=verdict,
     )
 
@@ -195,7 +205,8 @@ _LONG_NAMES = {
     "amplitude": "amplitude (half of maximum less minimum), mean over the later half",
     "amplitude_limit": "amplitude to which the swings tend",
     "contraction": "factor by which the distance from that limit shrinks in a period",
-    "verdict": "persistent, decaying, undecided (too few swings) or none",
+    "chance": "probability that noise without a period has such a spectrum, NaN for a solver",
+    "verdict": "persistent, decaying, noise, undecided (too few swings) or none",
 }
 
 
@@ -208,7 +219,7 @@ def oscillations(
     start: float = 0.0,
     prominence: float = 0.02,
 ) -> xr.Dataset:
-    """Period and amplitude of oscillations in every replica, and whether they last.
+    """Period and amplitude of oscillations in every replica, and whether they last or are noise.
 
     Replicas drift out of phase, so each is analysed by itself; the mean over replicas would decay
     where none of them does.
@@ -232,8 +243,11 @@ def oscillations(
     -------
     xarray.Dataset
         ``extremum_time``, ``extremum_value``, ``extremum_kind`` (replica, extremum), NaN beyond the
-        last; ``period``, ``amplitude``, ``amplitude_limit``, ``contraction`` and ``verdict``
-        (replica). Means over the replicas, with standard errors, are in the attributes.
+        last; ``period``, ``amplitude``, ``amplitude_limit``, ``contraction``, ``chance`` and
+        ``verdict`` (replica). The swings of a simulation are called noise if its spectrum is, by a
+        chance above 0.001, that of noise without a period; see
+        `smolux.analysis.periodicity.chance_of_noise`. Means over the replicas, with standard
+        errors, are in the attributes.
 
     Raises
     ------
@@ -244,7 +258,8 @@ def oscillations(
     curve = curve.isel(time=curve["time"].values >= start)
     if curve.sizes["time"] < 5:
         raise InputError(f"start = {start!r}: fewer than 5 output times are left")
-    found = [_find(curve["time"].values, row, prominence) for row in curve.values]
+    noisy = not is_deterministic(ds)
+    found = [_find(curve["time"].values, row, prominence, noisy) for row in curve.values]
     tables = np.full((3, len(found), max(len(f.at) for f in found)), np.nan)
     for r, f in enumerate(found):
         tables[:, r, : len(f.at)] = f.at, f.value, f.kind
@@ -257,6 +272,7 @@ def oscillations(
         "amplitude": ("replica", [f.amplitude for f in found]),
         "amplitude_limit": ("replica", [f.limit for f in found]),
         "contraction": ("replica", [f.contraction for f in found]),
+        "chance": ("replica", [f.chance for f in found]),
         "verdict": ("replica", [f.verdict for f in found]),
     }
     result = xr.Dataset(data, {"replica": ds["replica"]})

@@ -6,6 +6,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special, stats
 
+from smolux.confidence import Sample, mean_interval, quantile, skewed, vague
+
+__all__ = [
+    "ROUNDING",
+    "Sample",
+    "deviation",
+    "mean_interval",
+    "normal_equivalent",
+    "over_replicas",
+    "quantile",
+    "skewed",
+    "vague",
+    "welch",
+]
+
 Float = NDArray[np.float64]
 
 #: relative differences below which two numbers count as the same: sums of doubles in another order
@@ -25,27 +40,8 @@ def over_replicas(values: ArrayLike) -> tuple[Float, Float, Float]:
     count, mean, error : ndarray of shape (...)
         The mean is NaN where nothing was observed, the standard error where fewer than two were.
     """
-    values = np.asarray(values, float)
-    seen = np.isfinite(values)
-    count = seen.sum(axis=0).astype(float)
-    # around the first observation, so that equal values have a spread of exactly zero
-    first = np.take_along_axis(values, np.argmax(seen, axis=0)[None], axis=0)
-    shifted = np.where(seen, values - first, 0.0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = shifted.sum(axis=0) / count
-        square = np.where(seen, (shifted - mean) ** 2, 0.0).sum(axis=0)
-        error = np.where(count > 1, np.sqrt(square / (count - 1) / count), np.nan)
-    return count, mean + first[0], error
-
-
-def quantile(count: ArrayLike, level: float = 0.95) -> Float:
-    """Half width of the two-sided Student interval in standard errors, for `count` replicas.
-
-    NaN for fewer than two.
-    """
-    count = np.asarray(count, float)
-    dof = np.where(count > 1, count - 1, np.nan)
-    return np.asarray(stats.t.ppf(0.5 + level / 2, dof), float)
+    sample = Sample.of(values)
+    return sample.count, sample.mean, sample.error
 
 
 def normal_equivalent(t: ArrayLike, dof: ArrayLike) -> Float:
@@ -77,6 +73,7 @@ def deviation(
     dof: ArrayLike,
     magnitude: ArrayLike,
     certain: ArrayLike = np.inf,
+    sample: Sample | None = None,
 ) -> Float:
     """Deviation in standard deviations of the normal law; NaN where the error is not known.
 
@@ -89,6 +86,9 @@ def deviation(
     certain : array_like
         Replicas without any spread say nothing about the error, so the answer is NaN; but a
         relative difference above `certain` no chance explains, and the answer is infinite.
+    sample : Sample, optional
+        The replicas, if their mean is compared with a number: then their skewness counts, see
+        `smolux.confidence.skewed`.
 
     Returns
     -------
@@ -98,7 +98,8 @@ def deviation(
         *(np.asarray(x, float) for x in (difference, error, dof, magnitude, certain))
     )
     with np.errstate(all="ignore"):
-        z = normal_equivalent(difference / error, dof)
+        t = difference / error
+        z = normal_equivalent(t if sample is None else skewed(t, sample), dof)
     size, scale = np.abs(difference), np.abs(magnitude)
     with np.errstate(invalid="ignore"):
         beyond = np.where(size > certain * scale, np.copysign(np.inf, difference), np.nan)
@@ -120,39 +121,3 @@ def welch(error_a: ArrayLike, count_a: ArrayLike, error_b: ArrayLike, count_b: A
         part_a = np.where(a > 0, a**2 / (np.asarray(count_a, float) - 1), 0.0)
         part_b = np.where(b > 0, b**2 / (np.asarray(count_b, float) - 1), 0.0)
         return np.asarray((a + b) ** 2 / (part_a + part_b), float)
-
-
-def joint_test(z: Float, rows: Float) -> tuple[float, float, float]:
-    """Test many correlated deviations at once.
-
-    If nothing differs, the sum ``Q = sum z**2`` over entries with correlation matrix C has the
-    cumulants ``tr C``, ``2 tr C**2``, ``8 tr C**3``. It is compared with the chi-square law shifted
-    and stretched to the same three. C is estimated from the scatter of the replicas, which for a
-    small sample makes its powers too large and the test careful. In trials, equal laws are rejected
-    no more often than they should be at p = 0.05, and at most three times as often at p = 0.001.
-
-    Parameters
-    ----------
-    z : ndarray of shape (m,)
-        Standard normal deviates.
-    rows : ndarray of shape (R, m)
-        Deviations of the replicas from their mean, scaled so that each column has the sum of
-        squares one.
-
-    Returns
-    -------
-    p, x, f : float
-        Probability of a larger Q; the chi-square that stands for it and its degrees of freedom, at
-        most those that the replicas have.
-
-    References
-    ----------
-    J. P. Imhof, Biometrika 48, 419 (1961), doi:10.1093/biomet/48.3-4.419, section 4 (Pearson's
-    three-moment approximation).
-    """
-    # the Gram matrix of the replicas has the eigenvalues of C, and is small
-    eigenvalues = np.linalg.eigvalsh(rows @ rows.T)
-    squares, cubes = float(np.sum(eigenvalues**2)), float(np.sum(eigenvalues**3))
-    f = squares**3 / cubes**2
-    x = (float(np.sum(z**2)) - len(z)) * float(np.sqrt(f / squares)) + f
-    return float(stats.chi2.sf(x, f)), x, f

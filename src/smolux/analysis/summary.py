@@ -12,22 +12,28 @@ from smolux.errors import InputError
 from smolux.results import require
 
 from .balance import mass_balance
+from .rare import Rare
 from .reference import exact_dataset, is_deterministic
-from .statistics import ROUNDING, deviation, over_replicas, quantile
+from .statistics import ROUNDING, Sample, deviation, mean_interval, vague
 
 Float = NDArray[np.float64]
 
 #: the labels of the dimension `statistic`
-STATISTICS = ("mean", "standard_error", "lower", "upper", "exact", "sigmas", "replicas")
+STATISTICS = ("mean", "standard_error", "lower", "upper", "exact", "sigmas", "replicas", "doubtful")
 
 _MEANINGS = {
     "mean": "mean over the replicas that reached the time",
     "standard_error": "standard error of the mean; NaN for a single replica",
-    "lower, upper": "95 % interval of the mean by Student's t over the replicas",
+    "lower, upper": "95 % interval of the mean: Student's t or, if it reaches further, Hall's "
+    "transformation of it for skewed laws; of a density that rests on at most 30 clusters in all "
+    "replicas, that of a Poisson count",
     "exact": "exact solution in the limit of infinitely many particles, NaN where none is known",
     "sigmas": "(mean - exact) / standard_error, turned from Student's t into the normal deviate of "
-    "the same probability; NaN where the replicas show no spread",
+    "the same probability, with the same allowance for skewness; NaN where the replicas show no "
+    "spread",
     "replicas": "number of replicas in the mean",
+    "doubtful": "1 where there are too few replicas to promise 95 %: two or three, a standard "
+    "error above a fifth of the mean, or a size of which one or two clusters were seen",
 }
 
 _BIAS = (
@@ -55,18 +61,26 @@ def certain_difference(name: str, orders: Float, dims: Sequence[str], resolution
     return allowed.reshape([-1 if d == "order" else 1 for d in dims])
 
 
+def has_moved(ds: xr.Dataset) -> NDArray[np.bool_]:
+    """Say at which times anything has happened in any replica, of whatever kind."""
+    events = ds["collisions"].max("replica").values > 0
+    if "events" in ds and ds.sizes.get("process", 0):
+        events = events | (ds["events"].max(("replica", "process")).values > 0)
+    if "mass_in" in ds:
+        moved = (ds["mass_in"] > 0) | (ds["mass_out"] > 0)
+        events = events | moved.any("replica").values
+    return np.asarray(events | np.isnan(ds["volume"].values).all(axis=0))
+
+
 def _of_variable(ds: xr.Dataset, exact: xr.Dataset | None, name: str) -> xr.DataArray:
     variable = ds[name].transpose("replica", ...)
     dims = [str(d) for d in variable.dims[1:]]
-    count, mean, error = over_replicas(variable.values)
+    sample = Sample.of(variable.values)
+    count, mean = sample.count, sample.mean
     # a spread of the last digits is none
-    error = np.where(error <= ROUNDING * np.abs(mean), 0.0, error)
-    if name == "n":
-        # the same count in every replica, above all zero, is luck and no proof of certainty, unless
-        # nothing has happened yet
-        moved = (ds["collisions"].max("replica") != 0).values
-        error = np.where((error == 0) & moved[:, None], np.nan, error)
-    half = quantile(count) * error
+    error = np.where(sample.error <= ROUNDING * np.abs(mean), 0.0, sample.error)
+    lower, upper = (np.where(error == 0, mean, end) for end in mean_interval(sample))
+    doubtful = vague(sample) & (error > 0)
     known = np.full(mean.shape, np.nan)
     if exact is not None:
         known = exact[name].transpose(*dims).values
@@ -74,8 +88,20 @@ def _of_variable(ds: xr.Dataset, exact: xr.Dataset | None, name: str) -> xr.Data
     finite = np.where(np.isfinite(known), known, np.nan)
     magnitude = np.fmax(np.abs(mean), np.abs(finite))
     certain = certain_difference(name, ds["order"].values, dims, mass_resolution(ds))
-    sigmas = deviation(mean - finite, error, count - 1, magnitude, certain)
-    values = np.stack([mean, error, mean - half, mean + half, known, sigmas, count], axis=-1)
+    if name == "n":
+        # the same count in every replica, above all zero, is luck and no proof of certainty, unless
+        # nothing has happened yet
+        luck = (error == 0) & has_moved(ds)[:, None]
+        error, lower, upper = (np.where(luck, np.nan, x) for x in (error, lower, upper))
+    sigmas = deviation(mean - finite, error, count - 1, magnitude, certain, sample)
+    rare = Rare.of(ds, variable.values) if name == "n" and ds.sizes["replica"] > 1 else None
+    if rare is not None:
+        few = rare.few & has_moved(ds)[:, None]
+        ends = (error, rare.error()), *zip((lower, upper), rare.interval(), strict=True)
+        error, lower, upper = (np.where(few, b, a) for a, b in ends)
+        sigmas = np.where(few, rare.sigmas(finite), sigmas)
+        doubtful = np.where(few, rare.doubtful, doubtful)
+    values = np.stack([mean, error, lower, upper, known, sigmas, count, doubtful], axis=-1)
     coordinates = {d: ds[d] for d in dims} | {"statistic": list(STATISTICS)}
     return xr.DataArray(values, coordinates, [*dims, "statistic"], attrs=dict(ds[name].attrs))
 
@@ -90,6 +116,11 @@ def _notes(ds: xr.Dataset, result: xr.Dataset, exact: xr.Dataset | None) -> list
         notes.append(_BIAS)
         if replicas == 1:
             notes.append("One replica tells nothing of its scatter: no interval; use 8 or more.")
+        if any(bool((v.sel(statistic="doubtful") == 1).any()) for v in result.values()):
+            notes.append(
+                "Too few replicas to promise 95 % where an interval has a question mark (statistic "
+                "doubtful): use 8 or more, or more particles."
+            )
     if np.any(count < replicas):
         since = ds["time"].values[np.argmax(count < replicas)]
         notes.append(

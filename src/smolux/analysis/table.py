@@ -16,14 +16,18 @@ def _number(value: float, digits: int) -> str:
     return f"{value:.{digits}g}" if isfinite(value) else "-" if value != value else f"{value:g}"
 
 
-def _pair(mean: float, half: float) -> tuple[str, str]:
-    """Write a mean to the second digit of its interval."""
+def pair(mean: float, lower: float, upper: float) -> tuple[str, str]:
+    """Write a mean to the second digit of its interval, and the interval, by one or two numbers."""
+    low, high = mean - lower, upper - mean
+    half = max(low, high)
     if not (isfinite(mean) and isfinite(half) and half > 0 and mean != 0):
         return _number(mean, 6), _number(half, 2)
     if half > abs(mean):
-        return _number(mean, 2), f"±{half:.2g}"
-    digits = floor(log10(abs(mean))) - floor(log10(half)) + 2
-    return _number(mean, min(max(digits, 2), 12)), f"±{half:.2g}"
+        digits = 2
+    else:
+        digits = min(max(floor(log10(abs(mean))) - floor(log10(half)) + 2, 2), 12)
+    one = abs(high - low) < 0.1 * half  # by less than its two digits can well show
+    return _number(mean, digits), f"±{half:.2g}" if one else f"-{low:.2g} +{high:.2g}"
 
 
 def _rows(variable: xr.DataArray) -> list[tuple[str, ...]]:
@@ -37,8 +41,10 @@ def _rows(variable: xr.DataArray) -> list[tuple[str, ...]]:
     rows = [tuple(header)]
     for t, time in enumerate(variable["time"].values):
         mean, exact = float(column["mean"][t]), float(column["exact"][t])
-        half = float(column["upper"][t]) - mean
-        row = [_number(float(time), 6), *_pair(mean, half)[: 2 if scatter else 1]]
+        cells = pair(mean, float(column["lower"][t]), float(column["upper"][t]))
+        row = [_number(float(time), 6), *cells[: 2 if scatter else 1]]
+        if scatter and column["doubtful"][t] == 1:
+            row[-1] += "?"
         if known:
             relative = (mean - exact) / abs(exact) if exact else nan
             last = float(column["sigmas"][t]) if scatter else relative
@@ -109,7 +115,8 @@ def format_table(summary: xr.Dataset, variables: Sequence[str] | None = None) ->
     Returns
     -------
     str
-        A dash stands for what is not known. For the columns see `tables`.
+        A dash stands for what is not known, a question mark behind an interval for too few
+        replicas to promise 95 %. For the columns see `tables`.
 
     Raises
     ------

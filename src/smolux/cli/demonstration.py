@@ -72,11 +72,13 @@ def verdict(ds: Any) -> tuple[str, bool]:
     """Say and return whether a result agrees with the exact solution."""
     found = analysis.compare(ds, "exact").attrs
     agrees = found["agree"] == 1
-    words = "agrees" if agrees else "DOES NOT AGREE"
+    words = {1: "agrees with", 0: "DOES NOT AGREE with"}.get(found["agree"], "cannot be told from")
     text = (
-        f"The simulation {words} with the exact solution: all {found['entries']} moments and "
-        f"densities\ntogether have p = {found['p_value']:.2g} (below 0.001 would be a difference)."
+        f"The simulation {words} the exact solution: all {found['entries']} moments and "
+        f"densities\ntogether have p = {found['p_value']:.2g} (below 0.005 would be a difference)."
     )
+    if found["agree"] < 0:
+        text += f" {found['notes']}"
     return text, agrees
 
 

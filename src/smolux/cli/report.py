@@ -151,13 +151,14 @@ def _agreement(ds: Any, solution: Any) -> list[str]:
 def agreement(ds: Any, solution: Any) -> str:
     """Say in a sentence whether a result and a solution of the rate equations agree."""
     found = analysis.compare(ds, solution).attrs
-    if found["agree"] < 0:
+    if not found["entries"]:
         return "Nothing could be tested against the solution of the rate equations."
-    verdict = "agrees with" if found["agree"] else "differs from"
+    words = {1: "agrees with", 0: "differs from"}.get(found["agree"], "cannot be told from")
+    note = f" {found['notes']}" if found["agree"] < 0 else ""
     return (
-        f"The simulation {verdict} the solution of the rate equations: joint test of "
+        f"The simulation {words} the solution of the rate equations: joint test of "
         f"{found['entries']} numbers p = {found['p_value']:.3g}; the largest deviation is "
-        f"{found['largest_sigmas']:.2f} standard deviations ({found['where']})."
+        f"{found['largest_sigmas']:.2f} standard deviations ({found['where']}).{note}"
     )
 
 

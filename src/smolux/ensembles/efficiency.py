@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from smolux import exact as solutions
-from smolux.analysis.statistics import quantile
+from smolux.confidence import quantile
 from smolux.deterministic import SolverError
 from smolux.deterministic.solver import solve
 from smolux.errors import InputError
@@ -272,8 +272,8 @@ def _biased(found: Sequence[Collected], reference: Float) -> dict[str, Float]:
     """Return the bias of each pair and its interval."""
     moments = [each.moments for each in found]
     bias = np.array([m.mean - reference for m in moments])
-    half = np.array([quantile(m.count) * m.error for m in moments])
-    return {"bias": bias, "bias_lower": bias - half, "bias_upper": bias + half}
+    lower, upper = (np.array(ends) for ends in zip(*(m.interval() for m in moments), strict=True))
+    return {"bias": bias, "bias_lower": lower - reference, "bias_upper": upper - reference}
 
 
 def _compared(found: Sequence[Collected]) -> dict[str, Float]:

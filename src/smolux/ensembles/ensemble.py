@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.analysis.statistics import quantile
 from smolux.checks import whole
+from smolux.confidence import quantile
 from smolux.errors import InputError, Interrupted, OutOfMemoryError
 from smolux.methods.base import Method
 from smolux.model import Model

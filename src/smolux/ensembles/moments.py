@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smolux.analysis.statistics import quantile
+from smolux.confidence import Sample, freedom, mean_interval, variance_interval
 
 Float = NDArray[np.float64]
 
@@ -85,20 +85,24 @@ class Moments:
     def relative_error(self) -> Float:
         """Standard error of the variance, relative to it.
 
-        From ``Var(s^2) = (mu_4 - (n - 3) / (n - 1) sigma^4) / n``, whatever the law of the samples.
-        NaN where all samples are equal.
+        That of the chi-square law that the variance follows, see `smolux.confidence.freedom`. NaN
+        where all samples are equal.
         """
-        n = np.float64(self.count)
         with np.errstate(invalid="ignore", divide="ignore"):
-            excess = self.fourth / n / self.variance**2 - (n - 3.0) / (n - 1.0)
-            return np.asarray(np.sqrt(np.maximum(excess, 0.0) / n))
+            return np.where(self.second > 0.0, np.sqrt(2.0 / freedom(self.sample)), np.nan)
+
+    @property
+    def sample(self) -> Sample:
+        """What intervals need to know."""
+        return Sample.from_sums(self.count, self.mean, self.second, self.third, self.fourth)
 
     def interval(self) -> tuple[Float, Float]:
-        """Return the 95 % interval of the mean (Student)."""
-        half = quantile(self.count) * self.error
-        return self.mean - half, self.mean + half
+        """Return the 95 % interval of the mean, see `smolux.confidence.mean_interval`."""
+        lower, upper = mean_interval(self.sample)
+        # a tail that is not known does not widen what has no spread at all
+        certain = self.second == 0.0
+        return np.where(certain, self.mean, lower), np.where(certain, self.mean, upper)
 
     def variance_interval(self) -> tuple[Float, Float]:
-        """Return the 95 % interval of the variance; symmetric in its logarithm, above zero."""
-        ratio = np.exp(quantile(self.count) * self.relative_error)
-        return self.variance / ratio, self.variance * ratio
+        """Return the 95 % interval of the variance, see `smolux.confidence.freedom`."""
+        return variance_interval(self.sample)

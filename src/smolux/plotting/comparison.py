@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from smolux.analysis.reference import is_deterministic, solution_of
 from smolux.analysis.select import matches, series
-from smolux.analysis.statistics import over_replicas, quantile
+from smolux.analysis.statistics import Sample, mean_interval, over_replicas
 from smolux.errors import InputError
 
 from .curves import Look, draw, draw_line, draw_points, drawn_as
@@ -59,11 +59,11 @@ def _deviations(
     """
     times = ds["time"].values
     here, there = matches(times, reference[0])
-    count, mean, error = over_replicas(values[:, here])
+    sample = Sample.of(values[:, here])
     known = reference[1][there]
     with np.errstate(all="ignore"):
-        percent = 100 * (mean / known - 1)
-        half = np.abs(100 * quantile(count) * error / known)
+        percent = 100 * (sample.mean / known - 1)
+        bars = np.abs(100 * (np.stack(mean_interval(sample)) - sample.mean) / known)
     low, high = ax.get_xlim()
     if ax.get_xscale() == "log":
         x = times[here] * (high / low) ** (0.01 * shift)
@@ -72,7 +72,7 @@ def _deviations(
     if is_deterministic(ds):
         draw_line(ax, times[here], percent, look.colour)
     else:
-        draw_points(ax, x, percent, half, look, zorder=3)
+        draw_points(ax, x, percent, bars, look, zorder=3)
 
 
 @styled

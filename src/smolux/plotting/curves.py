@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from smolux.analysis.reference import is_deterministic, solution_of
-from smolux.analysis.statistics import over_replicas, quantile
+from smolux.analysis.statistics import Sample, mean_interval
 from smolux.errors import InputError
 
 from .style import MARKERS, PALETTE
@@ -51,7 +51,7 @@ def draw_values(
     line: bool | None = None,
     **options: Any,
 ) -> None:
-    """Draw the mean of simulated replicas with 95 % intervals by Student's t.
+    """Draw the mean of simulated replicas with their 95 % intervals.
 
     Parameters
     ----------
@@ -69,37 +69,38 @@ def draw_values(
     **options
         For the markers, such as ``zorder``.
     """
-    count, mean, error = over_replicas(values)
-    error = np.where(error == 0, np.nan, error) if counts else error
-    draw_points(ax, x, mean, quantile(count) * error, look, line=line, **options)
+    sample = Sample.of(values)
+    bars = np.stack(mean_interval(sample)) - sample.mean
+    bars = np.abs(np.where(sample.error == 0, np.nan if counts else 0.0, bars))
+    draw_points(ax, x, sample.mean, bars, look, line=line, **options)
 
 
 def draw_points(
     ax: Axes,
     x: Float,
     mean: Float,
-    half: Float,
+    bars: Float,
     look: Look,
     *,
     line: bool | None = None,
     **options: Any,
 ) -> None:
-    """Draw points with given half widths of their bars, NaN where they are not known."""
+    """Draw points with the lengths of their bars, below and above; NaN where not known."""
     shown = np.isfinite(mean) & np.isfinite(x)
     if ax.get_yscale() == "log":
         shown &= mean > 0
     if ax.get_xscale() == "log":
         shown &= x > 0
-    x, mean, half = x[shown], mean[shown], half[shown]
+    x, mean, bars = x[shown], mean[shown], bars[:, shown]
     if len(x) > _CROWDED if line is None else line:
         ax.plot(x, mean, color=look.colour, lw=0.8, **options)
-        ax.fill_between(x, mean - half, mean + half, color=look.colour, alpha=0.25, lw=0)
+        ax.fill_between(x, mean - bars[0], mean + bars[1], color=look.colour, alpha=0.25, lw=0)
         return
-    known = np.isfinite(half)
+    known = np.isfinite(bars).all(axis=0)
     style = {"ls": "none", "color": look.colour, "marker": look.marker, **options}
     if known.any():
         fill = "none" if look.hollow else look.colour
-        ax.errorbar(x[known], mean[known], yerr=half[known], elinewidth=0.8, mfc=fill, **style)
+        ax.errorbar(x[known], mean[known], yerr=bars[:, known], elinewidth=0.8, mfc=fill, **style)
     if not known.all():
         ax.plot(x[~known], mean[~known], mfc="white", **style)
 
