@@ -205,8 +205,8 @@ def radau_step(
     gamma = TABLEAU.embedded
     defect = gamma * h * (start - TABLEAU.at_start @ rates)
     error = _Triangular(diagonal, band, h, gamma).solve(defect).real
-    sums = (h * (TABLEAU.matrix[-1] @ what) for what in (last, there))
-    return Step(change, error, rates, *sums, iteration, contraction)
+    weights = h * TABLEAU.matrix[-1]
+    return Step(change, error, rates, weights @ last, weights @ there, iteration, contraction)
 
 
 class Mixing:
