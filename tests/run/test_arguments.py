@@ -122,7 +122,7 @@ SOLVE = [
     ("tolerance", 0.0, "tolerance"),
     ("times", [2.0, 1.0], "must ascend"),
     ("model", 3, "must be a smolux.Model"),
-    ("largest", 0, "largest"),
+    ("window", 0, "window"),
 ]
 
 

@@ -16,6 +16,7 @@ import smolux as sx
 from smolux import processes
 from smolux.content import digest, frozen, is_frozen
 from smolux.core.compile import user_piece
+from smolux.deterministic.splitting import Splits
 from smolux.plan import make_plan
 from smolux.windows import windows_for
 
@@ -192,8 +193,8 @@ def test_rates_asked_for_outside_a_run_see_the_change(monkeypatch: pytest.Monkey
     sizes, found = np.arange(1.0, 9.0), []
     for value in (0.5, 3.0):
         monkeypatch.setitem(globals(), "height", value)
-        rates, gain = process.rates(sizes), process.gain(sizes, sizes, sizes)
-        found.append((rates / value, gain / value))
+        terms = Splits(process.daughters.law, 8)
+        found.append((terms.rates / value, terms.gain(sizes[None, :])[0] / value))
     np.testing.assert_allclose(*found, rtol=1e-12)
 
 

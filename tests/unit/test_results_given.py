@@ -50,7 +50,13 @@ NO_RESULT: dict[str, Any] = {
 
 def test_all_functions_are_here() -> None:
     others = {"SCHEMA", "VARIABLES", "load", "provenance", "require", "to_dataset", "told"}
-    assert set(TAKES) == {*analysis.__all__, *results.__all__} - others - {"extrema"}
+    assert set(TAKES) == {*analysis.__all__, *results.__all__} - others - {"extrema", "verdict"}
+
+
+def test_a_verdict_is_of_a_comparison() -> None:
+    for given in (3, {}, {"p_value": 1.0}):
+        with pytest.raises(InputError, match=r"^found = .*compare returned"):
+            analysis.verdict(given)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("given", NO_RESULT.values(), ids=NO_RESULT)

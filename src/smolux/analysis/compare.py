@@ -328,7 +328,16 @@ def verdict(found: Mapping[str, Any], comparisons: int = 1) -> tuple[int, str]:
     agree : int
         0, 1 or -1.
     words : str
+
+    Raises
+    ------
+    InputError
+        If it is not of a comparison.
     """
+    if not (isinstance(found, Mapping) and {*_SHARES, "found_beyond"} <= set(found)):
+        raise InputError(
+            f"found = {found!r:.60}: must be the attributes of what analysis.compare returned"
+        )
     p = {name: found[name] * comparisons / share for name, share in _SHARES.items()}
     tested = [each for each in p.values() if each == each]
     if not tested:

@@ -12,7 +12,7 @@ from ..processes.daughters import Merged
 from .gel import gel_affinity
 from .meeting import Meeting
 from .operator import Direct, Operator, OperatorFactory
-from .terms import SUMS, Flow, term_of
+from .terms import SUMS, Flow, Leaving, term_of
 
 Float = NDArray[np.float64]
 
@@ -102,6 +102,11 @@ class Equations:
         return self.model.cut is not None and self.count == max(self.model.cut // self.unit, 1)
 
     @property
+    def leaves(self) -> bool:
+        """Whether anything ever leaves the system."""
+        return self.cut or any(isinstance(term, Leaving) for term in self._terms)
+
+    @property
     def quantities(self) -> int:
         """How many quantities `rates` gives to be integrated along, see `Totals`."""
         return len(self.processes) + SUMS
@@ -176,8 +181,8 @@ class Equations:
         return factor
 
     def conserves(self, n: Float) -> bool:
-        """Whether what happens within the window keeps its mass: a gel takes some of it."""
-        if self.model.open:
+        """Whether no mass leaves at a rate that depends on what is there."""
+        if any(isinstance(term, Leaving) and term.vanishing.any() for term in self._terms):
             return False
         return self._gel is None or self.mass - float(n @ self.sizes) <= _NO_GEL * self.mass
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .account import Account, Entry
 from .equations import Equations
 from .radau import ESTIMATE_POWER, STAGES, STEP_POWER, TABLEAU, Step, extrapolate, radau_step
-from .terms import Totals
+from .terms import MASS_OUT, OVER_MASS, Totals
 from .timemesh import TimeMesh, within
 from .window import Window
 
@@ -271,8 +271,10 @@ class Integrator:
             self._resize(count)
             self._h = h
             return
-        if not self._entered(step, n, h):
+        along = self._settled(step, n)
+        if not self._entered(step, along, n, h):
             return
+        self.along = self.along + along
         self._accept(step, n, h, end)
         proposed = h * float(np.clip(factor, _LEAST, _MOST))
         # a step cut short at an output time says little of longer ones
@@ -284,13 +286,13 @@ class Integrator:
 
     @property
     def _kept(self) -> Float | None:
-        """Weights of the densities whose sum does not change: the sizes, while nothing leaves."""
+        """Weights of densities whose sum does not depend on them: the sizes, while none leave."""
         stays = self._flow <= self.tolerance and self.equations.conserves(self.n)
         return self.equations.sizes if stays else None
 
-    def _entered(self, step: Step, n: Float, h: float) -> bool:
+    def _entered(self, step: Step, along: Float, n: Float, h: float) -> bool:
         """Enter a step into the account; False if its sums over pairs are to be found anew."""
-        sizes, totals = self.equations.sizes, Totals.of(step.along)
+        sizes, totals = self.equations.sizes, Totals.of(along)
         of_rates = Totals.of(step.along_rates)
         flow = h * (TABLEAU.matrix[-1] @ step.rates)
         number, mass = (
@@ -314,13 +316,25 @@ class Integrator:
         self.n, self.t = n, end
         self.steps += 1
         self._careful = max(0, self._careful - 1)
-        self.along = self.along + step.along
         self._before = h, step.change
         self._start = step.rates[-1]
         number = float(np.abs(n).sum())
         self._most = max(self._most, number)
         if number < _NOTHING * self._most:  # below it nothing is told from rounding any more
             self.n = np.zeros_like(n)
+
+    def _settled(self, step: Step, n: Float) -> Float:
+        """Return what was integrated along, with the mass that leaves as the densities have it.
+
+        It is that of the last iterate but one; the mass of the densities tells what the last
+        correction changed of it.
+        """
+        along, totals = step.along.copy(), Totals.of(step.along)
+        sizes = self.equations.sizes
+        missing = float((n - self.n) @ sizes) - totals.mass
+        if abs(missing) <= self.tolerance * float(n @ sizes):
+            along[MASS_OUT if self.equations.leaves else OVER_MASS] -= missing
+        return along
 
     def _resize(self, count: int) -> None:
         """Add sizes, all empty."""

@@ -111,12 +111,12 @@ class LowRank:
 
     def prepare(self, n: Float | None) -> None:
         """See `Operator.prepare`: choose the tilts."""
-        if n is None or not n.any():
+        lost = None if n is None else n * self.loss(n[None, :])[0]
+        if n is None or lost is None or not lost.any():  # nothing meets
             self._untilt()
             return
         if self._tilts is None:
             self._tilts = Tilts(self._gain.rows, self._gain.core, self._gain.power)
-        lost = n * self.loss(n[None, :])[0]
         tilts, excess = self._tilts(n, lost, self._allowed)
         self._parts = [_Part(self._gain, tilt) for tilt in tilts]
         self._room = max(_GROWN, 1.0 / max(excess, 1e-300))

@@ -134,9 +134,10 @@ def radau_step(
 
     The stages solve ``Z = h Q f(n + Z)``. The iteration ``Z <- Z + (1 - h Q x A)^{-1} r`` with the
     residual r takes for A the bands that `Rates.jacobian` gives, so that the linear systems are
-    triangular and banded, one for each pair of conjugate eigenvalues of Q. Where a weighted sum of
-    the densities never changes, A is completed by what makes this true of it, too: then every
-    iterate keeps the sum to rounding, and the solution of the stages is what it was.
+    triangular and banded, one for each pair of conjugate eigenvalues of Q. Where the change
+    of a weighted sum of the densities does not depend on them, A is completed by what makes this
+    true of it, too: then every iterate has the sum to rounding, and the solution of the stages is
+    what it was.
 
     Parameters
     ----------
@@ -152,7 +153,7 @@ def radau_step(
     tolerance : float
         For the error of the step; a twentieth of it is allowed to the iteration.
     kept : ndarray of shape (M,), optional
-        Weights w with ``w f(n) = 0`` for all n.
+        Weights w for which ``w f(n)`` is the same for all n.
 
     Returns
     -------

@@ -22,8 +22,9 @@ from .splitting import Splits
 
 Float = NDArray[np.float64]
 
-#: what is integrated along beside the events
+#: what is integrated along beside the events, and the places of what leaves
 SUMS = 5
+MASS_OUT, OVER_MASS = -3, -1
 
 
 class Flow:
