@@ -12,6 +12,7 @@ import smolux as sx
 import smolux.spatial as sp
 from shared import stopped
 from smolux import results
+from smolux.spatial.windowed import WindowedRun
 
 
 def merges(result):
@@ -53,20 +54,21 @@ def test_what_is_reached_already():
 
 
 @stopped
-@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs timers")
-def test_ctrl_c_leaves_what_was_reached():
+def test_ctrl_c_leaves_what_was_reached(monkeypatch):
     """It comes while the compiled loop runs; the events of that loop must not be lost."""
     s = sp.lattice(40_000, 0.1, seed=1)
-    sp.simulate(s, max_events=10)  # compiled from here on
+    monkeypatch.setattr("smolux.spatial.running._BUDGET", 8000)
+    advance = WindowedRun.advance
 
-    before = signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
-    try:
-        signal.setitimer(signal.ITIMER_REAL, 0.05)
-        with pytest.raises(sx.Interrupted) as caught:
-            sp.simulate(s)
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+    def interrupted(self, *limits):
+        code = advance(self, *limits)
+        signal.raise_signal(signal.SIGINT)  # what came meanwhile is seen when the loop returns
+        return code
+
+    monkeypatch.setattr(WindowedRun, "advance", interrupted)
+    with pytest.raises(sx.Interrupted) as caught:
+        sp.simulate(s)
+    monkeypatch.undo()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     part = caught.value.dataset
     assert part.attrs["stopped"] == "interrupted"
