@@ -1,5 +1,7 @@
 """Summaries and comparisons: honest intervals, and differences that are found."""
 
+import re
+
 import numpy as np
 import pytest
 import synthetic
@@ -315,9 +317,12 @@ def test_the_mass_of_an_open_system_is_a_balance():
     ds = sx.solve(sx.Model(sx.kernels.Constant(), processes), [0.0, 1.0, 2.0])
     now = 4 - 3 * np.exp(-1.0)
     text = analysis.mass_balance(ds)
-    assert text == (
-        f"Mass M1 = 1 at t = 0, + 4 that came in, - {5 - now:.6g} that left, = {now:.6g} at t = 2; "
-        "this adds up to rounding."
+    start = (
+        f"Mass M1 = 1 at t = 0, + 4 that came in, - {5 - now:.6g} that left, = {now:.6g} at t = 2;"
+    )
+    # what went beyond the window by then is far below the tolerance, but may be seen
+    assert re.fullmatch(
+        re.escape(start) + r" this adds up (to rounding|but for .\..e-1[1-9] of it)\.", text
     )
     assert text in analysis.format_table(sx.summary(ds))
     # from the first output time on, whatever the volume is
