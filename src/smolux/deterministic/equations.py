@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
 from ..model import Model
 from ..processes.base import PairProcess, Process
 from ..processes.daughters import Merged
@@ -13,6 +12,7 @@ from .gel import gel_affinity
 from .meeting import Meeting
 from .operator import Direct, Operator, OperatorFactory
 from .terms import SUMS, Flow, Leaving, term_of
+from .timemesh import factor_at
 
 Float = NDArray[np.float64]
 
@@ -170,15 +170,7 @@ class Equations:
         law = self._factors[p]
         if law.constant is not None:
             return np.full(len(times), law.constant)
-        factor = np.asarray(law(np.clip(times, *self.span)), float)
-        wrong = ~(np.isfinite(factor) & (factor >= 0.0))
-        if wrong.any():
-            k = int(np.argmax(wrong))
-            raise InputError(
-                f"the rate of {self.processes[p].name} is {factor[k]:g} at t = {times[k]:.6g}: it "
-                "must be a finite number, zero or more, up to the last output time"
-            )
-        return factor
+        return factor_at(law, np.clip(times, *self.span), f"the rate of {self.processes[p].name}")
 
     def conserves(self, n: Float) -> bool:
         """Whether no mass leaves at a rate that depends on what is there."""

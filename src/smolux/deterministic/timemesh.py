@@ -78,6 +78,25 @@ def within(low: float, high: float) -> tuple[float, float]:
     return float(np.nextafter(low, high)), float(np.nextafter(high, low))
 
 
+def factor_at(law: TimeFunction, times: Float, what: str) -> Float:
+    """Evaluate a function of time that multiplies a rate.
+
+    Raises
+    ------
+    InputError
+        If it is negative or not finite, with the time.
+    """
+    values = np.asarray(law(times), float)
+    wrong = ~(np.isfinite(values) & (values >= 0.0))
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise InputError(
+            f"{what} is {values.flat[k]:g} at t = {times.flat[k]:.6g}: it must be a finite number, "
+            "zero or more, up to the last output time"
+        )
+    return values
+
+
 class _Pieces:
     """Ends of the pieces of one function."""
 
@@ -92,15 +111,7 @@ class _Pieces:
         self.edges = self._merge(low, high, np.concatenate([given, jumps]))
 
     def _at(self, times: Float) -> Float:
-        values = np.asarray(self._law(times), float)
-        wrong = ~(np.isfinite(values) & (values >= 0.0))
-        if wrong.any():
-            k = int(np.argmax(wrong))
-            raise InputError(
-                f"{self._law.text}: is {values.flat[k]:g} at t = {times.flat[k]:.6g}: it must be a "
-                "finite number, zero or more, up to the last output time"
-            )
-        return values
+        return factor_at(self._law, times, f"{self._law.text}:")
 
     def _look(self) -> Float:
         """Return times at which what the function does shows, ascending."""
