@@ -12,7 +12,7 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
 #: one package a paper or a promise, each with a ``SUITE``
-SUITES = ("kalinov_2021", "degond_2024", "kolodko_sabelfeld_2003", "solver", "coverage")
+SUITES = ("kalinov_2021", "degond_2024", "kolodko_sabelfeld_2003", "solver", "coverage", "mutation")
 
 
 def main(arguments: list[str] | None = None) -> int:

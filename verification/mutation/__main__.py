@@ -1,0 +1,7 @@
+"""Run this verification: ``python -m verification.mutation``."""
+
+import sys
+
+from ..run import main
+
+raise SystemExit(main(["mutation", *sys.argv[1:]]))
