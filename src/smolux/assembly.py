@@ -155,7 +155,7 @@ def uncompilable(model: Model, weighting: Weighting) -> list[str]:
     """Say which functions of the user Numba cannot compile, and what to do."""
     _, lone, _ = _kinds(model)
     given: list[tuple[str, Callable[..., Any], int]] = [
-        (f"the kernel {model.kernel.label}", model.kernel.rate, 2 + len(model.kernel.parameters)),
+        *((f"the kernel {k.label}", k.rate, 2 + len(k.parameters)) for _, k in model.kernel.parts),
         *((f"the rate of {p.name}", p.law, 2 if p.splits else 1) for p in lone),
         *((f"the rate of {p.name} in time", p.factor.rate, 1) for p in model.processes),
     ]

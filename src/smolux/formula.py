@@ -144,7 +144,7 @@ def check_names(names: Sequence[str], taken: Sequence[str], what: str) -> list[s
         if not name.isidentifier() or keyword.iskeyword(name) or name.startswith("_"):
             problems.append(f"{where}: a name has letters and digits and begins with a letter")
         elif name in FUNCTIONS or name in CONSTANTS or name in taken:
-            problems.append(f"{where}: has a meaning in formulas already; choose another name")
+            problems.append(f"{where}: has a meaning already; choose another name")
     return problems
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .content import digest
 from .core.compile import CompileError, entry, user_piece
-from .kernels import FunctionKernel
+from .kernels import FunctionKernel, Sum
 from .kernels.base import Kernel
 from .weighting.base import Weighting
 
@@ -42,6 +42,9 @@ def _over(rate: Callable[..., Any]) -> Any:
 
 def evaluated(kernel: Kernel) -> Callable[[Any, Any], Float]:
     """Return a frozen kernel on arrays of sizes."""
+    if isinstance(kernel, Sum):
+        terms = [(number, evaluated(term)) for number, term in kernel.parts]
+        return lambda i, j: np.asarray(sum(number * term(i, j) for number, term in terms))
     if not isinstance(kernel, FunctionKernel):
         return kernel
 

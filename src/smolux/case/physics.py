@@ -10,7 +10,7 @@ from typing import Any
 from .. import units
 from ..errors import InputError, did_you_mean
 from ..initial import INITIALS, Empty, Initial, Sizes
-from ..kernels import KERNELS
+from ..kernels import KERNELS, Sum
 from ..kernels.base import Kernel
 from ..model import Model
 from ..model_dict import model_from_dict, model_to_dict
@@ -18,7 +18,7 @@ from ..processes import PROCESSES
 from ..processes.base import Process
 from ..units import Dimension
 from .lines import Path
-from .reader import Problems, Table, show
+from .reader import Problems, Table, dotted, show
 
 #: what the parameters of laws, processes and initial conditions measure; others are plain numbers
 FIELDS: dict[tuple[str, str], Dimension] = {
@@ -113,6 +113,8 @@ def _place(message: str, data: Mapping[str, Any]) -> Path:
 
 def _kernel(table: Table) -> tuple[dict[str, Any], str]:
     laws = {k.name: k for k in KERNELS if k.name != "formula"}
+    if "terms" in table:
+        return _sum(table)
     if "formula" in table:
         return _formula(table), ""
     if "name" not in table:
@@ -139,6 +141,26 @@ def _kernel(table: Table) -> tuple[dict[str, Any], str]:
     table.known += [a for c in law.constructors for a in _signature(law, c)]
     table.finish()
     return data, ""
+
+
+def _sum(table: Table) -> tuple[dict[str, Any], str]:
+    """Read the terms ``[[kernel.terms]]`` of a sum, each as a kernel, with a coefficient."""
+    if table.take("name", Sum.name) != Sum.name:
+        table.bad("name", "a kernel has a name or terms, not both; take one out")
+    content = table.take("terms")
+    table.finish()
+    if not isinstance(content, list) or not content:
+        table.bad("terms", "must be tables [[kernel.terms]], each as of a kernel")
+        return {}, ""
+    terms, origins = [], []
+    for n, entry in enumerate(content):
+        term = Table(entry, (*table.path, "terms", n), table.problems)
+        coefficient = term.number("coefficient", None)
+        term.content.pop("coefficient", None)
+        data, origin = _kernel(term)
+        terms.append(data if coefficient is None else {**data, "coefficient": coefficient})
+        origins += [origin] if origin else []
+    return {"name": Sum.name, "terms": terms}, "; ".join(origins)
 
 
 def _signature(law: type[Kernel], constructor: str) -> Mapping[str, inspect.Parameter]:
@@ -305,6 +327,18 @@ def _densities(table: Table) -> dict[str, float] | None:
 def _require_units(data: Mapping[str, Any], problems: Problems) -> None:
     """In a case with units nothing may silently be 1 in SI units."""
     kernel, initial = data.get("kernel", {}), data.get("initial", {})
+    _require_scale(kernel, ("kernel",), problems)
+    for n, term in enumerate(kernel.get("terms", ())):
+        _require_scale(term, ("kernel", "terms", n), problems)
+    if initial.get("name") not in (Sizes.name, Empty.name) and "density" not in initial:
+        problems.add(
+            ("initial",),
+            "initial.density is missing: the case has units, so it needs "
+            f"{units.NUMBER_DENSITY.words} such as {show(units.NUMBER_DENSITY.example)}",
+        )
+
+
+def _require_scale(kernel: Mapping[str, Any], path: Path, problems: Problems) -> None:
     law = next((k for k in KERNELS if k.name == kernel.get("name")), None)
     if law is not None and "scale" in {f.name for f in fields(law)} and "scale" not in kernel:
         needed = [
@@ -313,15 +347,9 @@ def _require_units(data: Mapping[str, Any], problems: Problems) -> None:
         ]
         instead = "".join(f", or {' and '.join(names)}" for names in needed)
         problems.add(
-            ("kernel",),
-            f"kernel.scale is missing: the case has units, so the kernel needs "
+            path,
+            f"{dotted(path)}.scale is missing: the case has units, so the kernel needs "
             f"{units.KERNEL.words} such as {show(units.KERNEL.example)}{instead}",
-        )
-    if initial.get("name") not in (Sizes.name, Empty.name) and "density" not in initial:
-        problems.add(
-            ("initial",),
-            "initial.density is missing: the case has units, so it needs "
-            f"{units.NUMBER_DENSITY.words} such as {show(units.NUMBER_DENSITY.example)}",
         )
 
 
@@ -332,16 +360,20 @@ def model_tables(model: Model, si: bool) -> dict[str, Any]:
     """Tables of a case file for a model, with units if it has them."""
     data = model_to_dict(model)
     tables: dict[str, Any] = {"kernel": _given(data["kernel"])}
-    if tables["kernel"]["name"] == "formula":
-        del tables["kernel"]["name"]
+    laws = [tables["kernel"], *tables["kernel"].get("terms", ())]
+    for law in laws:
+        if law["name"] in ("formula", Sum.name):  # said by what else stands there
+            del law["name"]
+        elif si and "scale" in law:
+            law["scale"] = units.text(law["scale"], units.KERNEL)
     tables["processes"] = [_given(p) for p in data["processes"]]
     tables["initial"] = _initial_table(model.initial, data["initial"])
     if si:
         for (section, key), dimension in FIELDS.items():
-            value = tables[section].get(key)
+            value = tables[section].get(key) if section != "kernel" else None
             if isinstance(value, Mapping):
                 tables[section][key] = {k: units.text(v, dimension) for k, v in value.items()}
-            elif value is not None and "formula" not in tables[section]:
+            elif value is not None:
                 tables[section][key] = units.text(value, dimension)
     return tables
 

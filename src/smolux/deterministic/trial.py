@@ -12,7 +12,6 @@ from ..errors import InputError
 from ..intervals import Interval
 from ..kernels.base import Kernel
 from ..kernels.check import verdict
-from ..kernels.own import OwnKernel
 
 if TYPE_CHECKING:
     from .cross import Factors
@@ -64,7 +63,7 @@ class Sample:
         self.kernel, self.largest = kernel, largest
         rng = np.random.default_rng([largest, 0])
         pairs = [_common(rng, largest)]
-        if isinstance(kernel, OwnKernel):
+        if kernel.arbitrary:
             pairs += [
                 _all(min(largest, _ALL)),
                 _sums(rng, largest),

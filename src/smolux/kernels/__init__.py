@@ -15,6 +15,7 @@ from .product import Product
 from .registry import by_name, from_dict
 from .sedimentation import Sedimentation
 from .shear import Shear
+from .sum import Sum
 
 #: every law; the name in a case file is its ``name``
 KERNELS: tuple[type[Kernel], ...] = (
@@ -46,6 +47,7 @@ __all__ = [
     "Product",
     "Sedimentation",
     "Shear",
+    "Sum",
     "by_name",
     "formula",
     "from_dict",

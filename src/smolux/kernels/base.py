@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -53,6 +53,8 @@ class Kernel:
     rigorous: ClassVar[bool] = True
     #: whether `bounds` is a search, worth being remembered
     searched: ClassVar[bool] = False
+    #: whether it may be anything, as what users write: it is tried at more sizes
+    arbitrary: ClassVar[bool] = False
     #: key of the closed-form solution in `smolux.exact`, for monodisperse starts
     exact: ClassVar[str | None] = None
 
@@ -68,6 +70,11 @@ class Kernel:
     def parameters(self) -> tuple[float, ...]:
         """The parameters in the order `rate` takes them."""
         return tuple(float(getattr(self, f.name)) for f in fields(self))
+
+    @property
+    def parts(self) -> tuple[tuple[float, Kernel], ...]:
+        """The terms of a sum, each after its coefficient; no sums are among them."""
+        return ((1.0, self),)
 
     @property
     def label(self) -> str:
@@ -152,6 +159,31 @@ class Kernel:
     def singled_out(self) -> Float:
         """Whole sizes that the law names, where it may differ from what it is beside them."""
         return np.empty(0)
+
+    def __add__(self, other: Any) -> Kernel:
+        """Add the rates of two mechanisms, see `Sum`."""
+        from .sum import Sum
+
+        if isinstance(other, Kernel):
+            return Sum((self, other))
+        return self if is_number(other) and other == 0 else NotImplemented
+
+    __radd__ = __add__  # of sum(kernels), which begins with 0
+
+    def __mul__(self, number: Any) -> Kernel:
+        """Multiply the rates by a positive number."""
+        from .sum import Sum
+
+        if not is_number(number):
+            return NotImplemented
+        scale = {
+            f.name: float(number) * getattr(self, f.name) for f in fields(self) if f.name == "scale"
+        }
+        if scale:
+            return replace(self, **scale)
+        return Sum((self,), (number,))
+
+    __rmul__ = __mul__
 
     def problems(self, largest: float = 1.0) -> list[str]:
         """Return what is wrong with the law on a sample of sizes.

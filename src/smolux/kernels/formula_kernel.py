@@ -13,6 +13,9 @@ from smolux.laws import Law
 
 from .own import SIZES, OwnKernel
 
+#: words with a meaning in the table of a kernel
+_KEYS = ("name", "formula", "terms", "coefficient")
+
 
 @dataclass(frozen=True)
 class FormulaKernel(OwnKernel):
@@ -89,7 +92,7 @@ def formula(
     >>> float(formula("(i/j)**a + (j/i)**a", a=0.5)(1, 4))
     2.5
     """
-    problems = check_names(list(parameters), SIZES, "kernel")
+    problems = check_names(list(parameters), (*SIZES, *_KEYS), "kernel")
     for name, value in parameters.items():
         problems += wrong_number(value, f"kernel: parameter {name!r}")
     problems += [] if degree is None else wrong_number(degree, "kernel: degree")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +22,8 @@ SIZES = ("i", "j")
 @dataclass(frozen=True)
 class OwnKernel(Kernel):
     """A kernel of a `Law` in i and j."""
+
+    arbitrary: ClassVar[bool] = True
 
     @property
     def law(self) -> Law:

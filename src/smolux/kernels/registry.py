@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from smolux.errors import InputError, did_you_mean
 
 from .base import Kernel
 from .formula_kernel import formula
+from .sum import Sum
 
 
 def _laws() -> tuple[type[Kernel], ...]:
@@ -39,7 +40,9 @@ def from_dict(table: Mapping[str, Any]) -> Kernel:
     ----------
     table : mapping
         ``name`` and the parameters of the law. ``name = "brownian.continuum"`` calls a constructor
-        from physical quantities, in SI units; ``name = "formula"`` takes the text as ``formula``.
+        from physical quantities, in SI units; ``name = "formula"`` takes the text as ``formula``,
+        ``name = "sum"`` a list of such tables as ``terms``, each of which may have a
+        ``coefficient``.
 
     Returns
     -------
@@ -64,6 +67,8 @@ def from_dict(table: Mapping[str, Any]) -> Kernel:
         if text is None:
             raise InputError('kernel \'formula\': needs formula = "...", such as "(i + j)/2"')
         return formula(text, **rest)
+    if name == Sum.name:
+        return _sum(rest)
     make = _maker(name)
     accepted = inspect.signature(make).parameters
     problems = [
@@ -83,10 +88,33 @@ def from_dict(table: Mapping[str, Any]) -> Kernel:
     return kernel
 
 
+def _sum(rest: dict[str, Any]) -> Sum:
+    """Make a sum of its terms."""
+    terms = rest.pop("terms", None)
+    problems = [f"kernel 'sum': unknown key {key!r}; its terms are tables" for key in rest]
+    if isinstance(terms, str) or not isinstance(terms, Sequence) or not terms:
+        problems.append(
+            f"kernel 'sum': terms = {terms!r}: must be a list of tables, each as of a kernel, with "
+            "a coefficient or without"
+        )
+        raise InputError(problems)
+    made, coefficients = [], []
+    for term in terms:
+        table = dict(term) if isinstance(term, Mapping) else term
+        coefficients.append(table.pop("coefficient", 1.0) if isinstance(table, dict) else 1.0)
+        try:
+            made.append(from_dict(table))
+        except InputError as error:
+            problems += error.problems
+    if problems:
+        raise InputError(problems)
+    return Sum(tuple(made), tuple(coefficients))
+
+
 def _maker(name: str) -> Any:
     """Return the class, or the constructor after a point."""
     law, _, constructor = name.partition(".")
-    known = [law.name for law in _laws()] + ["formula"]
+    known = [law.name for law in _laws()] + ["formula", Sum.name]
     known += [f"{law.name}.{each}" for law in _laws() for each in law.constructors]
     if name not in known:
         raise InputError(f"kernel name = {name!r}: unknown{did_you_mean(name, known)}")
