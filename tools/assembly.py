@@ -50,15 +50,15 @@ def digest(loop: object) -> dict[str, object]:
     return {"sha256": hashlib.sha256(text.encode()).hexdigest(), "lines": text.count("\n") + 1}
 
 
-def loops() -> dict[str, dict[str, object]]:
-    """Compile the loop of each golden trajectory and return its digest."""
+def loops(only: str) -> dict[str, dict[str, object]]:
+    """Compile the loop of each golden trajectory that has `only` in its name."""
     import golden
 
     from smolux.replicas import Group
 
     found = {}
     for case, (*arguments, policy, _) in golden.CASES.items():
-        if policy == "doubling":  # the policy is data
+        if policy == "doubling" and only in case:  # the policy is data
             group = Group.start(golden.plan(*arguments, policy), 0, 1)
             group.compile()
             found[case] = digest(group.loop)
@@ -72,10 +72,11 @@ def main() -> int:
     action = parser.add_mutually_exclusive_group(required=True)
     action.add_argument("--write", type=Path, metavar="FILE")
     action.add_argument("--compare", type=Path, metavar="FILE")
+    parser.add_argument("--only", default="", metavar="TEXT", help="cases with this in the name")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         os.environ["SMOLUX_CACHE_DIR"] = folder  # code from the disk has no text
-        found = loops()
+        found = loops(given.only)
     if given.write:
         given.write.write_text(json.dumps(found, indent=1) + "\n")
         return 0
