@@ -84,6 +84,16 @@ class Model:
             raise InputError(problems)
 
     @property
+    def only_aggregates(self) -> bool:
+        """Whether nothing but aggregation takes place, at whatever rate."""
+        return all(isinstance(process, Aggregation) for process in self.processes)
+
+    @property
+    def plain_aggregation(self) -> bool:
+        """Whether aggregation alone takes place, at the rate of the kernel at all times."""
+        return self.only_aggregates and self.processes[0].factor.constant == 1.0
+
+    @property
     def open(self) -> bool:
         """Whether mass comes in or leaves."""
         return any(process.opens for process in self.processes)

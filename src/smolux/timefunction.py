@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -49,6 +50,8 @@ class TimeFunction(Law):
         """
         if isinstance(value, cls):
             return value
+        if isinstance(value, (str, float, int)):
+            return _remembered(value, what)
         if isinstance(value, Stated):
             read = cls.read(value.function, ("t",), what, _KINDS)
             new = replace(read, stated=value.bounds, breakpoints=value.breakpoints)
@@ -143,3 +146,11 @@ def _times(t0: Float, t1: Float, numbers: Float) -> tuple[Float, NDArray[np.int6
         times += found
         owners.append(np.full(sum(map(len, found)), k))
     return np.concatenate(times), np.concatenate(owners)
+
+
+@lru_cache(maxsize=256, typed=True)
+def _remembered(value: str | float, what: str) -> TimeFunction:
+    """Read a number or formula, which never change, once: processes are asked again and again."""
+    new = TimeFunction.read(value, ("t",), what, _KINDS)
+    new._check_start(what)
+    return new

@@ -178,6 +178,21 @@ def distribution_in_time(
         assert p > RARE, (shattering, t, p)
 
 
+def aggregation_in_time(method: Any, seed: int = 6) -> None:
+    """Aggregation at a rate that varies is aggregation in another time, here ``s = t + t**2/2``."""
+    times, replicas = np.array([0.3, 0.8]), 8000
+    processes = [sx.processes.Aggregation(varying="1 + t"), sx.processes.Shattering(0.0)]
+    ds = sx.simulate(
+        sx.Model(kernel("additive"), processes), times, method=method, population="fixed-volume",
+        particles=8, replicas=replicas, sizes=8, seed=seed, bins_per_octave=1,
+    )  # fmt: skip
+    for k, s in enumerate(times + times**2 / 2):
+        mean, variance = exact.finite.collision_moments(KNOWN["additive"], 8, s)
+        collisions = ds["collisions"].values[:, k]
+        agree(collisions, mean, ("mean collisions", k))
+        agree((collisions - mean) ** 2, variance, ("variance of collisions", k))
+
+
 def waiting_times(method: Any, seed: int = 3) -> None:
     """Times to the one cluster of two and of three particles, by Kolmogorov-Smirnov tests.
 

@@ -47,6 +47,14 @@ def test_distribution_with_a_rate_that_depends_on_time(method: str) -> None:
     laws.distribution_in_time(method, VARYING, lambda t: 0.4 * (1 + np.sin(5 * t)))
 
 
+@pytest.mark.parametrize(
+    "method",
+    [pytest.param(m, marks=() if m == QUICK_METHODS[1] else pytest.mark.slow) for m in METHODS],
+)
+def test_aggregation_at_a_rate_that_depends_on_time(method: str) -> None:
+    laws.aggregation_in_time(method)
+
+
 @every_method
 def test_waiting_times(method: str) -> None:
     laws.waiting_times(method)

@@ -206,3 +206,34 @@ def test_tolerance_controls_the_error():
         ds = sx.solve(model, [40.0], tolerance=tolerance)
         error = abs(float(ds["number_density"][0, 0]) / exact - 1)
         assert error < 10 * tolerance
+
+
+@pytest.mark.parametrize("method", ["direct", "low-rank"])
+@pytest.mark.parametrize(
+    ("varying", "clock"),
+    [
+        ("1 + t", lambda t: t + t**2 / 2),
+        (0.4, lambda t: 0.4 * t),
+        (lambda t: float(t < 1), lambda t: min(t, 1.0)),
+    ],
+)
+def test_aggregation_that_varies_in_time(method, varying, clock) -> None:
+    """It is aggregation in another time: ``n_k = 4/(s+2)**2 (s/(s+2))**(k-1)`` for K = 1."""
+    model = sx.Model(sx.kernels.Constant(), sx.processes.Aggregation(varying=varying))
+    times, k = [0.5, 2.0], np.arange(1, 30)
+    ds = sx.solve(model, times, method=method, tolerance=1e-8)
+    for t in times:
+        s = clock(t)
+        expected = 4 / (s + 2) ** 2 * (s / (s + 2)) ** (k - 1.0)
+        found = ds["n"].sel(time=t, size=k).values[0]
+        np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9)
+        assert ds["number_density"].sel(time=t).item() == pytest.approx(2 / (2 + s), rel=1e-7)
+
+
+@pytest.mark.filterwarnings("ignore:.*beyond the 400 sizes:smolux.errors.SmoluxWarning")
+def test_a_gel_takes_up_at_a_rate_that_varies() -> None:
+    """K = ij, monomers: ``n_1 = exp(-s)`` also beyond the gel time, with a gel that reacts."""
+    model = sx.Model(sx.kernels.Multiplicative(), sx.processes.Aggregation(varying="2 * t"))
+    times = np.array([0.8, 1.4])
+    ds = sx.solve(model, times, gel="reacts", window=400, tolerance=1e-8)
+    np.testing.assert_allclose(ds["n"].sel(size=1).values[0], np.exp(-(times**2)), rtol=1e-6)

@@ -22,6 +22,7 @@ KERNEL = {
 }  # fmt: skip
 OF_TIME, OF_SIZE, OF_PAIR = (0.5, "0.1*exp(-t)"), (1, "k**(1/3)", [0.1, 0.2]), (0.1, "1/(i*j)")
 PROCESS = {
+    ("aggregation", "varying"): OF_TIME,
     ("shattering", "rate"): OF_TIME,
     ("collisional-fragmentation", "rate"): OF_TIME,
     ("collisional-fragmentation", "debris"): (1.5, "1/k", [1, 0.5]),

@@ -125,9 +125,12 @@ def _checked(ds: xr.Dataset, sizes: ArrayLike, model: Model | None) -> tuple[Any
         problems.append(
             "model = None: the result does not hold its kernel, a Python function; give the model"
         )
-    elif any(p.name != "aggregation" for p in found.processes):
+    elif not found.plain_aggregation:
         names = ", ".join(p.name for p in found.processes)
-        problems.append(f"ds: has the processes {names}; only aggregation alone is supported")
+        problems.append(
+            f"ds: has the processes {names}; only aggregation alone is supported, at the rate of "
+            "the kernel"
+        )
     if problems:
         raise InputError(problems)
     settings = json.loads(ds.attrs.get("weighting_settings", "{}"))

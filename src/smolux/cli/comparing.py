@@ -116,7 +116,7 @@ def _solved(case: Case, progress: Display) -> Computed:
     run = case.run
     assert run is not None
     settings: dict[str, Any] = {"times": run.times, "tolerance": 1e-6}
-    if case.model.kernel.gels and all(p.name == "aggregation" for p in case.model.processes):
+    if case.model.kernel.gels and case.model.only_aggregates:
         settings["gel"] = "reacts"  # as it does in a simulation
     if case.solve is not None:
         settings = {k: v for k, v in asdict(case.solve).items() if v is not None}

@@ -192,7 +192,7 @@ def pilot(case: Case) -> Pilot:
     return Pilot(
         particles, first["time"].values[seen], **values,
         seconds_per_collision=seconds / events, end=case.run.times[-1],
-        merging=all(isinstance(p, Aggregation) for p in case.model.processes),
+        merging=case.model.only_aggregates,
     )  # fmt: skip
 
 
@@ -281,7 +281,7 @@ def negative_rates(case: Case) -> list[str]:
 
 def _gelation(case: Case) -> list[str]:
     kernel, initial = case.model.kernel, case.model.initial
-    if any(p.name != "aggregation" for p in case.model.processes):
+    if not case.model.plain_aggregation:
         return []  # what breaks clusters up can prevent a gel: no statement is known
     end = case.times[-1]
     if kernel.gels is None:

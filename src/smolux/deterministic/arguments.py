@@ -111,8 +111,10 @@ def checked(
 
 
 def _beside_a_gel(model: Model) -> list[str]:
+    if model.only_aggregates:
+        return []
     others = [p.name for p in model.processes if p.name != "aggregation"]
-    return others and [
+    return [
         f"gel = 'reacts': is for aggregation alone, not with {', '.join(others)}: what a gel would "
         "leave then is not defined; use gel='inert'"
     ]

@@ -13,7 +13,6 @@ from scipy.sparse import linalg as krylov
 from ..content import frozen
 from ..errors import InputError
 from ..model import Model
-from ..processes import Aggregation
 from .arguments import renamed
 from .equations import Equations
 from .integrate import SolverError
@@ -149,7 +148,7 @@ def steady_state(
             f"process {varying[0]!r}: its rate depends on time, so there is no steady state; "
             "give it a number"
         )
-    if all(isinstance(p, Aggregation) for p in model.processes):
+    if model.only_aggregates:
         raise InputError(
             "processes: with aggregation alone there is no steady state; add one that brings back "
             "small sizes, such as smolux.processes.Shattering(0.01)"

@@ -252,8 +252,8 @@ def _reference(sampler: Sampler, names: Sequence[str], exact: Any) -> tuple[Floa
             elif goal.target != "largest":
                 row[:] = solution.moment(plan.times, goal.order or 0.0, gel=goal.order is not None)
         return values, "exact solution"
-    plain = all(p.name == "aggregation" for p in plan.model.processes)
-    gel: dict[str, Any] = {"gel": "reacts"} if plan.model.kernel.gels and plain else {}
+    reacts = plan.model.kernel.gels and plan.model.only_aggregates
+    gel: dict[str, Any] = {"gel": "reacts"} if reacts else {}
     try:
         ds = solve(plan.model, plan.times, orders=plan.orders, sizes=plan.sizes, **gel)
     except SolverError as error:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from ..timefunction import TimeFunction
 from .base import PairProcess
 from .daughters import Merged
 
@@ -20,12 +21,34 @@ def _merge(i: int, j: int, sizes: Any, counts: Any) -> int:
 class Aggregation(PairProcess):
     """Colliding particles stick: ``(i) + (j) -> (i + j)`` at the rate of the kernel.
 
-    The Smoluchowski equations: ``dn_k/dt = 1/2 sum_{i+j=k} K n_i n_j - n_k sum_j K n_j``
-    (M. v. Smoluchowski, Phys. Z. 17, 557 (1916)).
+    The Smoluchowski equations:
+    ``dn_k/dt = f(t) (1/2 sum_{i+j=k} K n_i n_j - n_k sum_j K n_j)``.
+
+    Parameters
+    ----------
+    varying : float, callable or str
+        A function f of time by which the rate is multiplied, such as the share of encounters in
+        which the particles stick, or the shear rate of a flow that slows down. Where nothing else
+        happens, this is the same as another time, ``ds = f dt``.
+
+    References
+    ----------
+    M. v. Smoluchowski, Phys. Z. 17, 557 (1916).
     """
 
+    varying: Any = 1.0
     name: ClassVar[str] = "aggregation"
     outcome: ClassVar[Callable[..., Any]] = staticmethod(_merge)
+    #: what the fields are functions of, beside plain numbers
+    variables: ClassVar[Mapping[str, str]] = {"varying": "t"}
+
+    def __post_init__(self) -> None:
+        _ = self.factor
+
+    @property
+    def factor(self) -> TimeFunction:
+        """See `Process.factor`."""
+        return TimeFunction.of(self.varying, "the factor of aggregation")
 
     @property
     def daughters(self) -> Merged:
