@@ -46,6 +46,10 @@ def test_other_starts_and_unknown_kernels():
     assert "may gel" in warning
     (warning,) = estimate.physics_warnings(case('formula = "i*j"\ngels = true'))
     assert "at a time that is not known" in warning
+    (warning,) = estimate.physics_warnings(
+        case('name = "multiplicative"', rest='[[processes]]\nname = "aggregation"\nvarying = "t"')
+    )
+    assert "at a time that is not known" in warning
     assert estimate.physics_warnings(case('name = "constant"')) == []
 
 

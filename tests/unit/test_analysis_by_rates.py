@@ -72,8 +72,9 @@ def test_mistakes() -> None:
     assert len(error.value.problems) == 2
     assert "from 1 to 24" in error.value.problems[0]
     assert "three or more" in error.value.problems[1]
-    shattering = sx.Model(MODEL.kernel, [sx.processes.Aggregation(), sx.processes.Shattering(0.1)])
-    with pytest.raises(InputError, match="aggregation alone"):
-        densities_by_rates(ds, [2], model=shattering)
+    aggregation, shattering = sx.processes.Aggregation, sx.processes.Shattering
+    for others in ([aggregation(), shattering(0.1)], [aggregation(2.0)], [aggregation("1 + t")]):
+        with pytest.raises(InputError, match="aggregation alone"):
+            densities_by_rates(ds, [2], model=sx.Model(MODEL.kernel, others))
     with pytest.raises(InputError, match="a Python function; give the model"):
         densities_by_rates(ds.assign_attrs(model=""), [2])
