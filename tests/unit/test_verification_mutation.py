@@ -75,3 +75,11 @@ def test_tests_that_say_nothing_are_no_success(copy):
     (copy.folder / "src/smolux/numbers.py").write_text("twice = None")
     with pytest.raises(BrokenTrialError, match="fails without a mistake"):
         trials.pass_unchanged(copy, (("tests/test_numbers.py",), False))
+
+
+def test_all_areas_are_counted_together():
+    areas_ = {
+        "one": {"mistakes": [{"suite": "fast"}] * 18 + [{"suite": "none"}]},
+        "two": {"mistakes": [{"suite": "slow"}]},
+    }
+    assert "18 of 20 mistakes (90.0%), slow ones 1 more; 1 are seen by none" in trials.total(areas_)

@@ -1,7 +1,7 @@
 """Mistakes put into the code on purpose, one at a time, to see which tests fail."""
 
 from ..suite import Suite
-from .area import item
+from .area import item, total
 from .mistakes import areas
 
 SUITE = Suite(
@@ -9,6 +9,7 @@ SUITE = Suite(
     title="Mistakes that the tests see",
     paper="the test suite itself: a suite that sees a wrong program fail is worth something.",
     items=tuple(item(area) for area in areas()),
+    total=total,
     remarks=(
         "Each mistake changes a few characters of a copy of the code, such that a number comes "
         "out wrong or something is lost: a clock that forgets a wait, a bound one size short, a "

@@ -109,6 +109,17 @@ def present(area: str, data: dict[str, Any]) -> Outcome:
     )
 
 
+def total(values: dict[str, Any]) -> str:
+    """Say how many mistakes of all areas are seen."""
+    found = [m["suite"] for area in values.values() for m in area["mistakes"]]
+    fast, slow = found.count("fast"), found.count("slow")
+    share = fast / max(len(found), 1)
+    return (
+        f"**In all, the fast tests see {fast} of {len(found)} mistakes ({share:.1%}), slow ones "
+        f"{slow} more; {found.count('none')} are seen by none. The goal is {GOAL:.0%}.**"
+    )
+
+
 def item(area: str) -> Item:
     """Return an area as an item of the suite."""
     return Item(area, f"Mistakes in {area}", partial(compute, area), partial(present, area))
