@@ -310,7 +310,7 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
         s.attempts[pairs + r] += s.count[TRIALS] - before
         return min(s.count[LONE_PART], np.int64(1))
 
-    @cold_piece
+    @piece
     def draw_lone(s, w, windows, q, limit):
         if s.count[PARTICLES] == 0:
             return math.inf

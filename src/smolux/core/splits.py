@@ -201,7 +201,7 @@ def bind_splits(rate: Callable[..., Any]) -> tuple[Any, Any, Any]:
         place = min(np.int64((x - before) / each), width - 1)
         return first + place if place < count else np.int64(0), each
 
-    @cold_piece
+    @piece
     def part(size, s, q):
         row = row_of(size, q)
         raised = 1.0 if row >= 0 else 1.0 + s.clock[RAISED]
