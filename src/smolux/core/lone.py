@@ -270,27 +270,30 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
         k = pairs + r
         return windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
 
-    @cold_piece
+    @piece
     def find_slot(s, windows, octaves, x):
-        """Process and slot at which the cumulative sum passes `x`."""
-        process, slot = np.int64(0), np.int64(0)
+        """Process and slot where the cumulative sum passes `x`; the last if rounding has none."""
+        process, octave, inside = np.int64(0), np.int64(0), False
         for r in range(count):
             factor = factor_bound(s, windows, r)
             for o in range(octaves):
                 own = factor * s.sums[r, o]
                 if own <= 0.0:
                     continue
-                inside = x < own
-                for c in range(o << LONE_BITS, (o + 1) << LONE_BITS):
-                    value = factor * s.held[c] * s.most[r, c]
-                    if c > 0 and value > 0.0:
-                        process, slot = np.int64(r), np.int64(c)
-                        if inside and x < value:
-                            break
-                        x -= value if inside else 0.0
+                process, octave, inside = np.int64(r), np.int64(o), x < own
                 if inside:
-                    return process, slot
+                    break
                 x -= own
+            if inside:
+                break
+        factor, slot = factor_bound(s, windows, process), np.int64(0)
+        for c in range(octave << LONE_BITS, (octave + 1) << LONE_BITS):
+            value = factor * s.held[c] * s.most[process, c]
+            if c > 0 and value > 0.0:
+                slot = np.int64(c)
+                if inside and x < value:
+                    break
+                x -= value
         return process, slot
 
     @piece
