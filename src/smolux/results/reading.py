@@ -55,9 +55,10 @@ def require(
     missing = [name for name in needed if name not in ds and name not in ds.dims]
     if missing:
         raise InputError(f"{what}: is no result of {source}, it has no {', '.join(missing)}")
-    lacking = [f"{p:g}" for p in orders if p not in ds["order"].values]
+    present = list(np.asarray(ds["order"])) if orders else []
+    lacking = [f"{p:g}" for p in orders if p not in present]
     if lacking:
-        there = ", ".join(f"{p:g}" for p in ds["order"].values)
+        there = ", ".join(f"{p:g}" for p in present)
         raise InputError(
             f"{what}: has moments of the orders {there or 'none'}, and none of the order "
             f"{' and '.join(lacking)}, which is needed; name it in orders= of {source}"
