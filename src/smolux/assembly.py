@@ -242,7 +242,10 @@ def factor_parameters(processes: Sequence[Process]) -> Parameters:
     return Parameters(
         tuple(p.factor.parameters for p in pairs or [Aggregation()]),
         tuple(p.parameters for p in pairs or [Aggregation()]),
-        tuple((p.parameters, new_splits()) if p.splits else (p.parameters,) for p in lone),
+        tuple(
+            (p.parameters, new_splits(frozen(p.pairs).rigorous)) if p.splits else (p.parameters,)
+            for p in lone
+        ),
         tuple(p.factor.parameters for p in lone),
         tuple(p.factor.parameters for p in processes if isinstance(p, Source)),
     )

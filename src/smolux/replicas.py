@@ -254,6 +254,7 @@ class Group:
         elif code == SPLITS:
             assert self.parameters is not None
             bound_splits(plan.model.processes, self.parameters, int(self.state.count[r, WANTED]))
+            self.state.count[r, WANTED] = 0  # which replica asks first is no part of its state
         elif code == BAD_FACTOR:
             self._repair_factor(r)
         elif code == BAD_RATE:

@@ -15,7 +15,9 @@ P = sx.processes
 ALONE = sx.kernels.Constant(1e-30)
 #: one model for nearly all tests, so that they share their loops: breakage of one size or into
 #: halves, and removal by a list
-FORMULA = "c0*(i*j)**p*max(0, 1 - abs(i + j - k0)) + c1*max(0, 1 - max(0, abs(i - j) - 1)) + 1e-30"
+FORMULA = (
+    "c0*(i*j)**p*max(0, 1 - w*abs(i + j - k0)) + c1*max(0, 1 - max(0, abs(i - j) - 1)) + 1e-30"
+)
 #: a test fails once in 10^4 if all is right
 LEAST = 1e-4
 METHODS = [
@@ -26,9 +28,9 @@ METHODS = [
 
 def _model(
     start: Any, removal: Any = (0.0, 0.0), *, c0: float = 0.0, p: float = 0.0, k0: float = 2.0,
-    c1: float = 0.0,
+    c1: float = 0.0, w: float = 1.0,
 ) -> sx.Model:  # fmt: skip
-    law = sx.kernels.formula(FORMULA, c0=c0, p=p, k0=k0, c1=c1)
+    law = sx.kernels.formula(FORMULA, c0=c0, p=p, k0=k0, c1=c1, w=w)
     if isinstance(start, int):
         start = sx.initial.monodisperse(size=start)
     return sx.Model(ALONE, [P.Aggregation(), P.Removal(removal), P.Fragmentation(law)], start)
@@ -78,6 +80,38 @@ def test_halves_of_large_sizes_take_few_candidates() -> None:
     ds = _run(_model(40_960, c1=2.0), 2.0, particles=500, replicas=20)
     laws.agree(ds["particles"].values[:, 0] / 500, np.exp(2.0), "particles")
     assert ds["attempts"].sel(process="fragmentation").sum() < 3 * ds["events"].sum()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_random_scission(method: str) -> None:
+    """Every bond breaks by itself: sizes above 1000 have bounds, and are known one by one below."""
+    bonds, broken = 4999, 1.0 - np.exp(-2e-3)
+    settings = {"replicas": 20, "particles": 100}
+    ds = _run(_model(bonds + 1, c0=1.0, w=0.0), 4e-3, method=method, **settings)
+    events = int(ds["events"].sel(process="fragmentation").sum())
+    assert stats.binomtest(events, 2000 * bonds, broken).pvalue > LEAST
+    # pairs of monomers are in one piece if no bond between them is broken
+    apart = np.arange(1, bonds + 1)
+    square = bonds + 1 + 2.0 * ((bonds + 1 - apart) * (1.0 - broken) ** apart).sum()
+    found = ds["moment"].sel(order=2).values[:, 0] / ds["moment"].sel(order=1).values[:, 0]
+    laws.agree(found, square / (bonds + 1), "square")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_sizes_stored_together_have_their_own_rates(method: str) -> None:
+    """Two to an octave in the store, eight in the counts; each leaves at its rate."""
+    rates = {3: 0.5, 1030: 1.0, 1040: 0.3, 1300: 0.1, 1500: 2.0, 1501: 0.0}
+    listed = [0.0] * 1501
+    for size, rate in rates.items():
+        listed[size - 1] = rate
+    start = sx.initial.from_sizes(dict.fromkeys(rates, 1.0 / len(rates)))
+    model = _model(start, listed)
+    ds = _run(model, 0.7, method=method, particles=3000, sizes=1501)
+    left = np.rint((ds["n"] * ds["volume"]).sum(["replica", "time"]))
+    for size, rate in rates.items():
+        number = int(left.sel(size=size))
+        assert stats.binomtest(number, 2000, np.exp(-0.7 * rate)).pvalue > LEAST, size
+    assert ds["attempts"].sel(process="removal").sum() < 5 * ds["events"].sum() + 2000
 
 
 def _of_one_size(k: float) -> float:

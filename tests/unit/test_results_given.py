@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import xarray as xr
 from synthetic import constant_kernel
 
 import smolux as sx
-from smolux import analysis, results
+from smolux import analysis, plotting, results
 from smolux.errors import InputError
 from smolux.results import to_dataset
 
@@ -84,6 +85,25 @@ def test_an_empty_result(name: str, given: Any, tmp_path: Path, monkeypatch: Any
     words = ("the type DataTree", "it has no ", "make it with")
     assert any(word in str(error.value) for word in words)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("orders", [(0.0,), (0.0, 1.0), (2.0,), ()], ids=str)
+def test_moments_that_a_result_lacks(orders: Any, tmp_path: Path, monkeypatch: Any) -> None:
+    """What needs others says which, and what does not goes on."""
+    monkeypatch.chdir(tmp_path)
+    whole = to_dataset(sx.Model(sx.kernels.Constant()), constant_kernel(particles=50, replicas=2))
+    ds = whole.sel(order=list(orders))
+    for name, need in (("gel_fraction", 1), ("mean_size", 2), ("gelation", 2), ("scaling", 2)):
+        if not {1.0, float(need)} <= set(orders):
+            with pytest.raises(InputError, match=r"^ds: has moments of the orders .* orders= of"):
+                TAKES[name](ds)
+        elif name != "gelation":
+            TAKES[name](ds)
+    with pytest.raises(InputError, match=r"^ds: has moments of the orders"):
+        plotting.scaling(ds)
+    for name in ("compare", "mass_balance", "moments", "series", "summary", "to_csv"):
+        with contextlib.suppress(InputError):  # no KeyError
+            TAKES[name](ds)
 
 
 def test_what_a_result_is_compared_with() -> None:

@@ -7,7 +7,6 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import optimize
 
-from smolux.errors import InputError
 from smolux.initial.base import Initial
 from smolux.results import require
 
@@ -36,7 +35,7 @@ def gel_fraction(ds: xr.Dataset) -> xr.DataArray:
     -------
     xarray.DataArray of shape (replica, time)
     """
-    require(ds, "moment", "order", "time", "replica")
+    require(ds, "moment", "order", "time", "replica", orders=(1.0,))
     mass = ds["moment"].sel(order=1.0, drop=True).transpose("replica", "time")
     if is_deterministic(ds):
         share = 1 - mass / _all_mass(ds, mass)
@@ -171,12 +170,7 @@ def gelation(ds: xr.Dataset) -> xr.Dataset:
     D. J. Aldous, Bernoulli 5, 3 (1999), doi:10.2307/3318611; Ann. Probab. 25, 812 (1997),
     doi:10.1214/aop/1024404421, for the critical window.
     """
-    require(ds, "moment", "order", "time", "replica")
-    missing = [p for p in (1.0, 2.0) if p not in ds["order"].values]
-    if missing:
-        raise InputError(
-            f"gelation needs the moments of orders 1 and 2: {missing} not in the result"
-        )
+    require(ds, "moment", "order", "time", "replica", orders=(1.0, 2.0))
     t = ds["time"].values
     m2 = ds["moment"].sel(order=2.0, drop=True).transpose("replica", "time")
     result = xr.Dataset({"gel_fraction": gel_fraction(ds)})

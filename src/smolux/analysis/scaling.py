@@ -22,7 +22,7 @@ def mean_size(ds: xr.Dataset) -> xr.DataArray:
     -------
     xarray.DataArray over time
     """
-    require(ds, "moment", "order")
+    require(ds, "moment", "order", orders=(1.0, 2.0))
     moment = ds["moment"].mean("replica") if "replica" in ds["moment"].dims else ds["moment"]
     s = moment.sel(order=2.0, drop=True) / moment.sel(order=1.0, drop=True)
     return s.rename("mean_size").assign_attrs(long_name="mean size M2/M1", units="1")

@@ -91,7 +91,7 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
             total += s.clock[CLOCKS + r]
         return draw(s, w, p, total, limit) if pairs > 0 and total > 0.0 else math.inf
 
-    @cold_piece
+    @piece
     def other(s, w, windows, q, limit):
         """Draw what else comes first, return its waiting time; the limit if nothing does."""
         wait = limit
@@ -120,15 +120,18 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
             if reason != 0:
                 return reason
         s.missed[IN_DOUBT] = s.missed[SPLIT_IN_DOUBT] = 0.0
-        late, first, limit = s.count[LATE] == 1, math.inf, math.inf
-        if late:
-            first = other(s, w, windows, q, math.inf)
-            limit = min(first, windows.edges[s.count[WINDOW] + 1] - s.clock[TIME])
-        before = s.count[TRIALS]
-        wait = encounter(s, w, windows, p, limit)
-        looked = s.count[TRIALS] - before
-        if not late:
-            first = other(s, w, windows, q, wait)
+        late = s.count[LATE] == 1
+        wait = first = limit = math.inf
+        looked = np.int64(0)
+        for turn in range(2):
+            if late == (turn == 0):
+                first = other(s, w, windows, q, wait)
+                if late:
+                    limit = min(first, windows.edges[s.count[WINDOW] + 1] - s.clock[TIME])
+            else:
+                before = s.count[TRIALS]
+                wait = encounter(s, w, windows, p, limit)
+                looked = s.count[TRIALS] - before
         if math.isnan(wait) or math.isnan(first):
             return BAD_RATE
         if wait < first:
@@ -266,7 +269,7 @@ def make_fire(
                 return True
         return False
 
-    @cold_piece
+    @piece
     def book(s, gone, i, j, entries, q):
         """Bring the counts of single particles up to date."""
         if gone & 1:

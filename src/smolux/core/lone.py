@@ -3,7 +3,8 @@
 The particles are counted in slots of sizes, an eighth of an octave each, and every slot remembers
 the largest rate of what was in it since it was last empty. So the sum of the rates of all is known
 to within what rates differ in a slot, whatever a few large particles do. A slot is drawn by its
-sum, a particle in it with equal chance, and thinned by its own rate. The bounds are rates of sizes
+sum, with what the store holds together with it (`smolux.core.together`), a particle of that by the
+largest rates of their slots, and thinned by its own rate. The bounds are rates of sizes
 that are there, not of sizes that were tried: a rate that is not zero at one size only is not
 overlooked.
 """
@@ -19,7 +20,7 @@ import numpy as np
 from . import rng
 from .compile import cold_piece, piece, user_piece
 from .loop import PATIENCE
-from .slots import slot_of, slot_top
+from .slots import slot_of
 from .splits import bind_splits
 from .state import (
     CLOCKS,
@@ -269,27 +270,30 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
         k = pairs + r
         return windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
 
-    @cold_piece
+    @piece
     def find_slot(s, windows, octaves, x):
-        """Process and slot at which the cumulative sum passes `x`."""
-        process, slot = np.int64(0), np.int64(0)
+        """Process and slot where the cumulative sum passes `x`; the last if rounding has none."""
+        process, octave, inside = np.int64(0), np.int64(0), False
         for r in range(count):
             factor = factor_bound(s, windows, r)
             for o in range(octaves):
                 own = factor * s.sums[r, o]
                 if own <= 0.0:
                     continue
-                inside = x < own
-                for c in range(o << LONE_BITS, (o + 1) << LONE_BITS):
-                    value = factor * s.held[c] * s.most[r, c]
-                    if c > 0 and value > 0.0:
-                        process, slot = np.int64(r), np.int64(c)
-                        if inside and x < value:
-                            break
-                        x -= value if inside else 0.0
+                process, octave, inside = np.int64(r), np.int64(o), x < own
                 if inside:
-                    return process, slot
+                    break
                 x -= own
+            if inside:
+                break
+        factor, slot = factor_bound(s, windows, process), np.int64(0)
+        for c in range(octave << LONE_BITS, (octave + 1) << LONE_BITS):
+            value = factor * s.held[c] * s.most[process, c]
+            if c > 0 and value > 0.0:
+                slot = np.int64(c)
+                if inside and x < value:
+                    break
+                x -= value
         return process, slot
 
     @piece
@@ -298,19 +302,18 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
 
     @piece
     def candidate(s, w, r, c, q):
-        """Draw a particle of a slot: whether process `r` takes place, 1 or 0; -1 for no rate."""
+        """Draw a particle by a slot: whether process `r` takes place, 1 or 0; -1 for no rate."""
         before = s.count[TRIALS]
         s.count[TRIALS] += 1
-        high = slot_top(c, np.int64(LONE_BITS))
-        one, size = pick(s, w, slot_top(c - 1, np.int64(LONE_BITS)) + 1, high, s.held[c])
+        one, size = pick(s, w, r, c)
         s.count[LONE], s.count[LONE_SIZE], s.count[LONE_PROCESS] = one, size, r
         s.count[LONE_PART] = 0
-        if accepted(s, total(r, size, s, q), s.most[r, c]):
+        if accepted(s, total(r, size, s, q), s.most[r, slot_of(size, np.int64(LONE_BITS))]):
             s.count[LONE_PART] = part(r, size, s, q)
         s.attempts[pairs + r] += s.count[TRIALS] - before
         return min(s.count[LONE_PART], np.int64(1))
 
-    @cold_piece
+    @piece
     def draw_lone(s, w, windows, q, limit):
         if s.count[PARTICLES] == 0:
             return math.inf

@@ -113,9 +113,9 @@ class Pieces(NamedTuple):
         Bring bounds up to date; 0 or the reason to return.
     double : ``double(s, w)``
         Put every particle in once more; False, with nothing changed, if there is no room.
-    pick : ``pick(s, w, low, high, n)``
-        Place and size of one of the `n` particles of the sizes `low` to `high`, a slot of
-        `smolux.core.slots` or part of one; each with equal chance.
+    pick : ``pick(s, w, r, c)``
+        Place and size of one of the particles in slot `c` of `State.held`, or in this and others;
+        each with a chance in proportion to ``s.most[r]`` of its slot.
     seize : ``seize(s, w, place)``
         Put that particle in the place of the first of the pair.
     visit : ``visit(s, w, t, grid, p)``

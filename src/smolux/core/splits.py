@@ -2,11 +2,12 @@
 
 A size k has the splits ``i + (k - i)`` for i up to half of k. They lie in bins that double in width
 from both ends, as laws of breakage change fastest where a fragment is small, or where both are
-nearly equal. Up to the size `EXACT` all splits are gone through once, when the size first occurs:
-the rate is then exact, and every bin has the largest rate of its splits. Larger sizes have bounds
-for slots of sizes, asked for octave by octave, and a split that is drawn may come to nothing. Where
-nearly all would, as with a law that is not zero for halves only, the sizes of a slot are gone
-through as well, and the latest are remembered.
+nearly equal. Of small sizes all splits are gone through once, when the size first occurs: the rate
+is then exact, and every bin has the largest rate of its splits. Larger sizes have bounds for slots
+of sizes, asked for octave by octave, and a split that is drawn may come to nothing. Up to the size
+`EXACT` this is so only where bounds are proved and so close that it is rare, as they hold for all
+laws that are smooth. Above, where nearly all would, as with a law that is not zero for halves only,
+the sizes of a slot are gone through as well, and the latest are remembered.
 """
 
 from __future__ import annotations
@@ -23,17 +24,18 @@ from .compile import cold_piece, piece, user_piece
 from .slots import octave, slot_of, slot_top
 from .state import LONE_BITS, LONE_SLOTS, RAISED, SPLIT_IN_DOUBT, TRIALS
 
-#: largest size of which all splits are gone through in any case, and in slots of narrow laws
-EXACT, _LARGEST = 1 << 14, 1 << 26
+#: largest sizes of which all splits are gone through: in any case, where bounds are not proved and
+#: close, and in slots of narrow laws
+_SMALL, EXACT, _LARGEST = 1 << 10, 1 << 14, 1 << 26
 #: how many of these are remembered, as a power of two, and what spreads them over their rows
 _KEPT_BITS = 10
 _SPREAD = np.uint64(0x9E3779B97F4A7C15)
 #: bins of any size, at most
 _BINS = 2 * 62
-#: the slot of `EXACT`
-_FIRST = (14 - LONE_BITS + 1) << LONE_BITS
-#: share of candidates that come to something, below which a law is narrow
-_NARROW = 1 / 32
+#: the slots of `_SMALL` and `EXACT`
+_FIRST, _PROVED = (10 - LONE_BITS + 1) << LONE_BITS, (14 - LONE_BITS + 1) << LONE_BITS
+#: shares of candidates that come to something, below which bounds are not close, a law is narrow
+_CLOSE, _NARROW = 1 / 2, 1 / 32
 
 
 class Splits(NamedTuple):
@@ -61,13 +63,17 @@ class Splits(NamedTuple):
     narrow: np.ndarray
 
 
-def new_splits() -> Splits:
-    """Return tables of which nothing is known; memory is taken as they are filled."""
+def new_splits(proved: bool) -> Splits:
+    """Return tables of which nothing is known; memory is taken as they are filled.
+
+    Unless bounds of the law can be `proved`, none are asked for up to `EXACT`.
+    """
     rows, slots = EXACT + 1 + (1 << _KEPT_BITS), LONE_SLOTS - _FIRST
-    bounds = np.zeros((slots, _BINS))
-    bounds[:, 0] = -1.0
+    bounds, narrow = np.zeros((slots, _BINS)), np.zeros(slots, np.bool_)
+    first = 0 if proved else _PROVED - _FIRST
+    narrow[:first], bounds[first:, 0] = True, -1.0
     size, total = np.zeros(rows, np.int64), np.zeros(rows)
-    return Splits(size, total, np.zeros((rows, _BINS)), bounds, np.zeros(slots, np.bool_))
+    return Splits(size, total, np.zeros((rows, _BINS)), bounds, narrow)
 
 
 def slots_beside(size: int) -> slice:
@@ -76,12 +82,14 @@ def slots_beside(size: int) -> slice:
     return slice(first, first + (1 << LONE_BITS))
 
 
-def fill(splits: Splits, slots: slice, bounds: Any, widths: Any, means: Any) -> None:
-    """Take in bounds for the bins of slots above `EXACT`, the splits in each, and mean rates."""
+def fill(splits: Splits, slots: slice, bounds: Any, widths: Any, means: Any, proved: Any) -> None:
+    """Take in bounds for the bins of slots, the splits in each, mean rates, and what is proved."""
     rows = slice(slots.start - _FIRST, slots.stop - _FIRST)
     each = bounds * widths
     splits.bounds[rows, : each.shape[1]] = np.cumsum(each, axis=1)
-    splits.narrow[rows] = (means * widths).sum(axis=1) < _NARROW * each.sum(axis=1)
+    least = _NARROW if slots.start >= _PROVED else np.where(proved, _CLOSE, np.inf)
+    # a law that is zero everywhere is no narrow one
+    splits.narrow[rows] = (means * widths).sum(axis=1) < least * each.sum(axis=1)
 
 
 @piece
@@ -157,8 +165,10 @@ def bind_splits(rate: Callable[..., Any]) -> tuple[Any, Any, Any]:
     def row_of(k, q):
         """Row of a size, or -1 if it has none."""
         row = k
+        if k > _SMALL and not q[1].narrow[slot_of(k, np.int64(LONE_BITS)) - _FIRST]:
+            return np.int64(-1)
         if k > EXACT:
-            if k > _LARGEST or not q[1].narrow[slot_of(k, np.int64(LONE_BITS)) - _FIRST]:
+            if k > _LARGEST:
                 return np.int64(-1)
             # by the leading bits of a product: halves of a size must not share a row
             row = EXACT + 1 + np.int64((np.uint64(k) * _SPREAD) >> np.uint64(64 - _KEPT_BITS))
@@ -184,24 +194,26 @@ def bind_splits(rate: Callable[..., Any]) -> tuple[Any, Any, Any]:
 
     @piece
     def known(size, q):
-        return size <= EXACT or q[1].bounds[slot_of(size, np.int64(LONE_BITS)) - _FIRST, 0] >= 0.0
+        return size <= _SMALL or q[1].bounds[slot_of(size, np.int64(LONE_BITS)) - _FIRST, 0] >= 0.0
 
-    @cold_piece
+    @piece
     def candidate(s, k, row, q):
         """Split, by the bounds of the bins, and the bound of it; 0 if there is none there."""
-        last = bins_of(k) - 1
-        x = rng.uniform(s.rng) * end(k, row, last, q)
-        b, before = np.int64(0), 0.0
-        while b < last and x >= end(k, row, b, q):
-            before = end(k, row, b, q)
-            b += 1
+        b, low = bins_of(k) - 1, max(octave(k) - 1, np.int64(1))
+        x = rng.uniform(s.rng) * end(k, row, b, q)
+        if x < end(k, row, low, q):
+            b, low = low, np.int64(-1)
+        # down from the widest: most splits of most laws are there
+        while b > low + 1 and x < end(k, row, b - 1, q):
+            b -= 1
+        before = end(k, row, b - 1, q) if b > 0 else 0.0
         first, count = stretch(k, b)
         width = count if row >= 0 else width_of(k, b)
         each = (end(k, row, b, q) - before) / width
         place = min(np.int64((x - before) / each), width - 1)
         return first + place if place < count else np.int64(0), each
 
-    @cold_piece
+    @piece
     def part(size, s, q):
         row = row_of(size, q)
         raised = 1.0 if row >= 0 else 1.0 + s.clock[RAISED]

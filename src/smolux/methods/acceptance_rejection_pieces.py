@@ -15,10 +15,12 @@ from ..core.compile import at, cold_piece, piece
 from ..core.levels import renew_majorant
 from ..core.loop import PATIENCE, Pieces
 from ..core.prefetch import prefetch
+from ..core.slots import slot_of
 from ..core.state import (
     FIRST,
     FLOOR,
     LARGEST,
+    LONE_BITS,
     MAJORANT,
     MONOMERS,
     PARTICLES,
@@ -30,6 +32,7 @@ from ..core.state import (
     VALUE,
     VOLUME,
 )
+from ..core.together import largest_rate, takes
 from .acceptance_rejection_store import (
     APART,
     SLACK,
@@ -68,15 +71,17 @@ def _pair(s, w):
     return size_of(w, monomers, s.count[FIRST]), size_of(w, monomers, s.count[SECOND])
 
 
-@cold_piece
-def _pick(s, w, low, high, n):
-    if high == 1:
-        return rng.below(s.rng, n), np.int64(1)
-    # they lie anywhere
+@piece
+def _pick(s, w, r, c):
+    if c == 1:
+        return rng.below(s.rng, s.count[MONOMERS]), np.int64(1)
+    # all others are held together
+    largest = largest_rate(s, r, np.int64(2), slot_of(s.count[LARGEST], LONE_BITS))
     while True:
         k = rng.below(s.rng, s.count[STORED])
-        if low <= w.sizes[k] <= high:
-            return s.count[MONOMERS] + k, w.sizes[k]
+        size = np.int64(w.sizes[k])
+        if takes(s, r, size, largest):
+            return s.count[MONOMERS] + k, size
         s.count[TRIALS] += 1
 
 

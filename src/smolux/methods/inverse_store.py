@@ -9,7 +9,8 @@ import numpy as np
 
 from ..core import rng
 from ..core.compile import cold_piece, piece
-from ..core.state import FIRST, LARGEST, PARTICLES, SECOND, SINCE, STORED
+from ..core.slots import slot_top
+from ..core.state import FIRST, LARGEST, LONE_BITS, PARTICLES, SECOND, SINCE, STORED
 
 
 class Work(NamedTuple):
@@ -70,10 +71,11 @@ def pair(s, w):
     return size_at(w, s.count[FIRST]), size_at(w, s.count[SECOND])
 
 
-@cold_piece
-def pick(s, w, low, high, n):
-    """Slot and size of a particle of the sizes `low` to `high`, of which there are `n`."""
-    left, buckets = rng.below(s.rng, n), w.table.shape[1]
+@piece
+def pick(s, w, r, c):
+    """Slot and size of a particle, see `smolux.core.loop.Pieces`."""
+    low, high = slot_top(c - 1, LONE_BITS) + 1, slot_top(c, LONE_BITS)
+    left, buckets = rng.below(s.rng, s.held[c]), w.table.shape[1]
     for slot in range(low - 1, min(high, buckets)):
         if left < w.number[slot]:
             return np.int64(slot), np.int64(slot + 1)

@@ -14,6 +14,7 @@ from ..core.loop import PATIENCE
 from ..core.prefetch import prefetch
 from ..core.segment_tree import add, find, find_mixed
 from ..core.state import FIRST, FLOOR, PARTICLES, TRIALS, VALUE, VOLUME
+from ..core.together import largest_rate, slots_with, takes
 from .low_rank_store import (
     APART,
     POOL_NEEDED,
@@ -152,15 +153,15 @@ def _pair_with_apart(w, stage, x):
     w.chosen[2], w.chosen[3] = _choose_mixed(w, stage, x)
 
 
-@cold_piece
-def pick(s, w, low, high, n):
-    """Place and size of a particle of the sizes `low` to `high`, of which there are `n`.
+@piece
+def pick(s, w, r, c):
+    """Place and size of a particle, see `smolux.core.loop.Pieces`.
 
     A place is the number of the particle in its slot, with the slot above these bits.
     """
-    first, last = slot_for(w, low), min(slot_for(w, high), w.number.shape[0] - 1)
-    total = np.int64(0)
-    for slot in range(first, last + 1):
+    first, last, low, high = slots_with(c, w.bits[0])
+    total, largest = np.int64(0), largest_rate(s, r, low, high)
+    for slot in range(first, min(last + 1, w.number.shape[0])):
         total += np.int64(w.number[slot])
     while True:
         left, slot = rng.below(s.rng, total), first
@@ -168,7 +169,7 @@ def pick(s, w, low, high, n):
             left -= np.int64(w.number[slot])
             slot += 1
         size = size_at(w, slot, left)
-        if low <= size <= high:  # slots may be wider than what is asked for
+        if low == high or takes(s, r, size, largest):
             return (slot << _PLACE_BITS) | left, size
         s.count[TRIALS] += 1
 

@@ -13,8 +13,8 @@ from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
 from ..core.loop import PATIENCE, Pieces
 from ..core.prefetch import prefetch
-from ..core.slots import slot_of
 from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, TRIALS, VOLUME
+from ..core.together import largest_rate, slots_with, takes
 from ..core.wide import upper_half
 from .size_class_lists import place_in, place_of_particle, size_at, size_of_particle
 from .size_class_state import AHEAD, BITS, BLOCK, FREE, NEXT, PAIRS, SLOT, SLOT_BITS, STALE, view
@@ -27,10 +27,10 @@ def _pair(s, w):
     return size_of_particle(w, s.count[FIRST]), size_of_particle(w, s.count[SECOND])
 
 
-@cold_piece
-def _pick(s, w, low, high, n):
-    first, last = slot_of(low, w.meta[BITS]), slot_of(high, w.meta[BITS])
-    total = np.int64(0)
+@piece
+def _pick(s, w, r, c):
+    first, last, low, high = slots_with(c, w.meta[BITS])
+    total, largest = np.int64(0), largest_rate(s, r, low, high)
     for g in range(first, min(last + 1, w.number.shape[0])):
         total += w.number[g]
     while True:
@@ -40,7 +40,7 @@ def _pick(s, w, low, high, n):
             g += 1
         one = (g << SLOT_BITS) | k
         size = size_of_particle(w, one)
-        if low <= size <= high:  # classes may be wider than what is asked for
+        if low == high or takes(s, r, size, largest):
             return one, size
         s.count[TRIALS] += 1
 

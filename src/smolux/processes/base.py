@@ -106,7 +106,7 @@ class LoneProcess(Process):
 
     def split_bounds(
         self, low: Float, high: Float, bounds: Callable[..., tuple[Float, Float]]
-    ) -> tuple[Float, Float, Float]:
+    ) -> tuple[Float, Float, Float, Any]:
         """Bounds of the law of a process that `splits`, over ranges of sizes of one octave.
 
         The bins of splits are those of `smolux.core.splits.stretch`; `bounds` are the bounds of
@@ -120,6 +120,8 @@ class LoneProcess(Process):
             Splits of the largest size.
         means : ndarray of shape (ranges, bins)
             Rough mean of the law for the smallest size, to tell whether the bounds are far off.
+        proved : ndarray of bool of shape (ranges,)
+            Whether the bounds are.
         """
         raise NotImplementedError
 

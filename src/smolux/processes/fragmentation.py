@@ -18,8 +18,8 @@ from ..kernels.numeric import SAFETY
 from .base import Float, LoneProcess, Varying
 from .daughters import Split
 
-#: splits of a bin that are tried
-_TRIED = 32
+#: splits of a bin that are tried for a bound, and for a mean
+_TRIED, _FEW = 32, 8
 
 
 def _split(k: int, part: int, sizes: Any, counts: Any) -> int:
@@ -106,17 +106,20 @@ class Fragmentation(Varying, LoneProcess):
 
     def split_bounds(
         self, low: Float, high: Float, bounds: Callable[..., tuple[Float, Float]]
-    ) -> tuple[Float, Float, Float]:
+    ) -> tuple[Float, Float, Float, Any]:
         """See `LoneProcess.split_bounds`."""
         (a, b, c, d), widths = _bins(low, high)
         bound = bounds(a, b, c, d)[1]
+        finite = np.isfinite(bound)
         # in no step with any period
-        i = np.rint(a + (b - a) * spread(_TRIED)[:, None, None])
+        tried = spread(_FEW if finite.all() else _TRIED)
+        i = np.rint(a + (b - a) * tried[:, None, None])
         sizes = low[:, None] + np.arange(2.0)[:, None, None, None]  # an even one and an odd one
         found = np.nan_to_num(self.pairs(i, np.maximum(sizes - i, 1.0)), posinf=0.0)
         # intervals may find no bound: then by trial, and raised where a rate is above
-        bound = np.where(np.isfinite(bound), bound, SAFETY * found.max(axis=(0, 1)))
-        return bound, widths, found.mean(axis=1).min(axis=0)
+        bound = np.where(finite, bound, SAFETY * found.max(axis=(0, 1)))
+        proved = finite.all(axis=1) & self.pairs.rigorous
+        return bound, widths, found.mean(axis=1).min(axis=0), proved
 
     @property
     def daughters(self) -> Split:

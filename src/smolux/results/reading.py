@@ -21,6 +21,7 @@ def require(
     what: str = "ds",
     source: str = "simulate or solve",
     tree: bool = False,
+    orders: tuple[float, ...] = (),
 ) -> None:
     """Check that an argument is a result, before anything is read from it.
 
@@ -35,6 +36,8 @@ def require(
         What makes such a result, for messages.
     tree : bool
         Whether the tree of a spatial run is one, too.
+    orders : tuple of float
+        Of the moments that it must have.
 
     Raises
     ------
@@ -52,6 +55,14 @@ def require(
     missing = [name for name in needed if name not in ds and name not in ds.dims]
     if missing:
         raise InputError(f"{what}: is no result of {source}, it has no {', '.join(missing)}")
+    present = list(np.asarray(ds["order"])) if orders else []
+    lacking = [f"{p:g}" for p in orders if p not in present]
+    if lacking:
+        there = ", ".join(f"{p:g}" for p in present)
+        raise InputError(
+            f"{what}: has moments of the orders {there or 'none'}, and none of the order "
+            f"{' and '.join(lacking)}, which is needed; name it in orders= of {source}"
+        )
 
 
 def warnings(ds: xr.Dataset | xr.DataTree) -> list[str]:
