@@ -169,5 +169,5 @@ def test_few_accepted_candidates_are_warned_of() -> None:
     start = sx.initial.from_sizes({2: 1 - 1e-4, 1030: 1e-4})
     model = _model(start, _only(1030, 1.0))
     with pytest.warns(sx.SmoluxWarning, match="fewer than 1 in 1000"):
-        ds = _run(model, 50.0, method="acceptance-rejection", particles=20_000)
-    assert ds["events"].sel(process="removal").sum() == 8
+        ds = _run(model, 50.0, method="acceptance-rejection", particles=20_000, replicas=16)
+    assert ds["events"].sel(process="removal").sum() == 32
