@@ -190,6 +190,24 @@ def test_equal_laws_agree(seed):
         assert found.attrs["largest_sigmas"] < 5
 
 
+def test_it_does_not_matter_which_of_two_results_is_the_first():
+    ds, known = synthetic.constant_dataset(particles=200, seed=3), synthetic.solver_dataset()
+    there, back = analysis.compare(ds, known), analysis.compare(known, ds)
+    for name in ("number_density", "moment"):
+        sigmas = [found[name].sel(statistic="sigmas") for found in (there, back)]
+        np.testing.assert_allclose(sigmas[0], -sigmas[1], rtol=1e-9, atol=1e-12)
+    for name in ("p_value", "p_total", "p_largest"):
+        assert there.attrs[name] == pytest.approx(back.attrs[name], rel=1e-9)
+
+
+def test_a_doubled_volume_has_the_noise_that_it_was_doubled_with():
+    ds = synthetic.constant_dataset(replicas=6, seed=3).drop_vars(["n", "n_bin"])
+    doubled = ds.copy(deep=True)
+    doubled["volume"][:2, 1:] *= 2.0
+    p = [analysis.compare(each, "exact").attrs["p_value"] for each in (ds, doubled)]
+    assert p[0] == pytest.approx(p[1], rel=1e-12)
+
+
 def test_p_values_of_equal_laws_are_not_all_alike():
     p = [
         analysis.compare(

@@ -11,6 +11,7 @@ from smolux.confidence import (
     Sample,
     count_interval,
     enlarged,
+    freedom,
     mean_interval,
     quantile,
     skewed,
@@ -70,6 +71,14 @@ def test_the_third_moment_of_an_additive_kernel() -> None:
     held = covered(mean_interval(sample), values.mean())
     doubtful = vague(sample).mean()
     assert held > 0.95 - 4 * 0.007 or (held > 0.9 and doubtful > 0.2)
+
+
+def test_samples_of_a_normal_law_have_no_kurtosis_on_average() -> None:
+    """And their variance follows a chi-square law with one degree of freedom less than samples."""
+    sample = Sample.of(drawn("normal", 8))
+    for known in (sample.skewness, sample.excess):
+        assert abs(known.mean()) < 4 * known.std() / np.sqrt(TRIALS)
+    assert float(freedom(Sample.from_sums(8, *np.array([3.0, 7.0, 0.0, 1.0])))) == pytest.approx(7)
 
 
 def test_a_normal_law_costs_little() -> None:

@@ -244,6 +244,16 @@ def test_labels_have_units():
     assert ax.get_ylabel() == "moment $M_p$ (m$^{-3}$)"
 
 
+def test_the_scaled_form_does_not_depend_on_the_mass(solved):
+    mass = 3 / (1 + solved["time"])
+    names = ("number_density", "moment", "n", "n_bin")
+    other = solved.assign({name: mass * solved[name] for name in names})
+    both = [plotting.scaling(ds).axes[0].lines for ds in (solved, other)]
+    assert len(both[0]) == 4
+    for one, two in zip(*both, strict=True):
+        np.testing.assert_allclose(one.get_xydata(), two.get_xydata(), rtol=1e-12, atol=1e-300)
+
+
 def test_own_axes(many):
     figure = mpl.figure.Figure()
     left, right = figure.subplots(1, 2)
