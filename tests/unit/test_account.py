@@ -109,10 +109,11 @@ def test_what_makes_other_sizes_has_no_common_divisor():
         assert ds.attrs["unit"] == (15 if isinstance(process, P.Source) else 1)
 
 
-def test_kernel_on_multiples():
-    kernel = on_multiples(sx.kernels.Brownian(), 7)
+@pytest.mark.parametrize("law", [sx.kernels.Brownian(), sx.kernels.Additive(0.3)], ids=str)
+def test_kernel_on_multiples(law):
+    kernel = on_multiples(law, 7)
     i = np.array([1.0, 2.0, 5.0])
-    np.testing.assert_array_equal(kernel(i, 3.0), sx.kernels.Brownian()(7 * i, 21.0))
+    np.testing.assert_array_equal(kernel(i, 3.0), law(7 * i, 21.0))
     left, right = kernel.factors(i)
     np.testing.assert_allclose((left.T @ right), kernel(i[:, None], i[None, :]), rtol=1e-13)
 
