@@ -41,7 +41,7 @@ def test_other_starts_and_unknown_kernels():
     (warning,) = estimate.physics_warnings(
         case('name = "multiplicative"', rest='[initial]\nname = "exponential"\nmean = 5')
     )
-    assert "sooner" in warning
+    assert "monomers of the same mass at t = 0.2, this initial condition sooner" in warning
     (warning,) = estimate.physics_warnings(case('formula = "i*j"\ndegree = 2'))
     assert "may gel" in warning
     (warning,) = estimate.physics_warnings(case('formula = "i*j"\ngels = true'))

@@ -176,6 +176,8 @@ def test_inert_gel_follows_stockmayer():
     with pytest.warns(SmoluxWarning, match="Stockmayer"):
         ds = sx.solve(sx.Model(sx.kernels.Multiplicative()), [1.5, 2.0], max_window=1024)
     np.testing.assert_allclose(ds["moment"].sel(order=1)[0], [1 / 1.5, 1 / 2], rtol=1e-6)
+    exact = sx.summary(ds)["moment"].sel(statistic="exact", order=1)
+    np.testing.assert_allclose(exact, [1 / 1.5, 1 / 2], rtol=1e-12)
     # the densities at the gel time over t, but for the truncation: an error of order M**-3/2 x M
     np.testing.assert_allclose(ds["number_density"][0], [1 / 3, 1 / 4], rtol=5e-3)
 

@@ -10,6 +10,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 import smolux as sx
+from shared import FORMULA
 from smolux import analysis
 
 DATA = Path(__file__).parents[1] / "reference" / "data"
@@ -123,9 +124,8 @@ def test_the_noise_of_an_equilibrium_does_not_last(rho):
 
 def test_an_equilibrium_of_few_particles_has_no_period():
     """500 particles under shattering; each replica swings by a tenth of its mean."""
-    model = sx.Model(
-        sx.kernels.Constant(), [sx.processes.Aggregation(), sx.processes.Shattering(0.1)]
-    )
+    kernel = sx.kernels.formula(FORMULA, c0=1.0, c1=0.0, c2=0.0, c3=0.0)
+    model = sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(0.1)])
     ds = sx.simulate(
         model, np.arange(0.0, 401.0), method="acceptance-rejection", particles=500, replicas=8,
         seed=1, sizes=8,

@@ -9,6 +9,7 @@ from scipy import stats
 
 import smolux as sx
 from smolux import analysis
+from smolux.analysis.rare import Rare
 from smolux.records import Records
 from smolux.results import to_dataset
 
@@ -114,10 +115,23 @@ def test_a_density_of_few_clusters_has_the_interval_of_a_count():
     lower, upper = (table.sel(statistic=s).values[seen] for s in ("lower", "upper"))
     truth = expected / 100
     assert 0.92 < np.mean((lower <= truth) & (truth <= upper)) < 0.99
+    # the square of the error is the variance of the mean; clumps by chance have more
+    error = table.sel(statistic="standard_error").values[seen]
+    assert np.sum(error**2) / 500 == pytest.approx(expected / 8 / 100**2, rel=0.15)
     # one or two clusters: other times there would have been none, and no interval
     doubtful = table.sel(statistic="doubtful").values == 1
     assert doubtful[seen][counts.sum(axis=0)[seen] <= 2].all()
     assert np.mean(doubtful[counts.sum(axis=0) > 2]) < 0.03  # in clumps, by chance
+
+
+def test_clusters_that_come_in_clumps_count_as_clumps():
+    """Of 200 at once in one of four replicas: on average there are as many as there were."""
+    clumps = np.random.default_rng(7).poisson(3.0, (4, 4000))
+    clumps = clumps[:, clumps.sum(axis=0) > 0]
+    found = Rare.counted(200.0 * clumps, np.ones(clumps.shape))
+    # their share of the dispersion is a chi-square number over its three degrees of freedom
+    size = 200.0 * clumps.sum(axis=0) / found.total / 200.0
+    assert size.mean() == pytest.approx(1.0, abs=4 * np.sqrt(2 / 3 / size.size))
 
 
 def test_replicas_that_did_not_reach_the_end():

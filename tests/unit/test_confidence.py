@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 import smolux as sx
+from shared import FORMULA
 from smolux.confidence import (
     Sample,
     count_interval,
@@ -60,9 +61,11 @@ def test_the_interval_of_a_mean_holds_for_skewed_laws(law: str, count: int) -> N
 
 def test_the_third_moment_of_an_additive_kernel() -> None:
     """Groups of 8 of 8000 replicas; one standard deviation of a share is 0.7 %."""
+    kernel = sx.kernels.formula(FORMULA, c0=0.0, c1=1.0, c2=0.0, c3=0.0)
+    model = sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(0.0)])
     ds = sx.simulate(
-        sx.Model(sx.kernels.Additive()), [1.0], method="acceptance-rejection", particles=200,
-        replicas=8000, seed=1, sizes=8, population="fixed-volume",
+        model, [1.0], method="acceptance-rejection", particles=200, replicas=8000, seed=1, sizes=8,
+        population="fixed-volume",
     )  # fmt: skip
     values = ds["moment"].sel(order=3).values[:, 0]
     sample = Sample.of(values.reshape(-1, 8).T)
