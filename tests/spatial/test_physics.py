@@ -86,6 +86,14 @@ def test_the_merger_tree_is_a_tree(lattice):
     assert (events["impact_parameter"].values <= 2 * lattice["radius"].values[0] * (1 + 1e-9)).all()
 
 
+def test_the_first_contact_of_each_disc(lattice):
+    events = lattice["events"].to_dataset()
+    first = np.full(lattice.sizes["disc"], np.inf)
+    for side in ("first", "second"):
+        np.minimum.at(first, events[side].values, events["time"].values)
+    np.testing.assert_array_equal(lattice["first_contact"], first)
+
+
 def test_replay_gives_any_instant(lattice, periodic):
     for result in (lattice, periodic):
         end = sp.replay(result, result.attrs["time_reached"])
@@ -105,12 +113,15 @@ def test_replay_gives_any_instant(lattice, periodic):
 def test_series_from_the_clusters_of_each_time(periodic):
     series = periodic["series"].to_dataset()
     for k, time in enumerate(series["time"].values):
-        _, sizes = np.unique(sp.replay(periodic, float(time))["cluster"], return_counts=True)
+        cluster = sp.replay(periodic, float(time))["cluster"].values
+        _, sizes = np.unique(cluster, return_counts=True)
         assert series["clusters"].values[k] == len(sizes)
         assert series["largest"].values[k] == sizes.max()
         np.testing.assert_allclose(series["moment"].values[k], [(sizes**p).sum() for p in range(4)])
         assert series["n_bin"].values[k].sum() == len(sizes)
         assert series["mean_mass"].values[k] == pytest.approx(400 / len(sizes))
+        heaviest = np.bincount(cluster, periodic["mass"].values).max()
+        assert series["largest_mass"].values[k] == pytest.approx(heaviest)
 
 
 def test_files_keep_everything(lattice, tmp_path):

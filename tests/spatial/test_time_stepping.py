@@ -50,6 +50,8 @@ def assert_sound(result: xr.DataTree, discs: int) -> None:
     events = result["events"].to_dataset()
     assert sorted(events["parents"].values.ravel()) == list(range(2 * discs - 2))
     assert events["sizes"].values[-1].sum() == discs
+    mass = np.concatenate([result["mass"].values, events["masses"].values.sum(1)])
+    np.testing.assert_allclose(events["masses"], mass[events["parents"].values])
     assert (np.diff(events["time"].values) >= 0).all()
 
 
