@@ -29,6 +29,11 @@ def test_moments_from_sizes_and_bins():
     one = analysis.moments(narrow, orders=(-1, 2))
     for bound in ("lower", "upper"):
         assert np.allclose(one[bound], one["moment"], rtol=1e-12)
+    # sum_k x**k / k is a logarithm
+    solved, x = synthetic.solver_dataset(times=(30.0,)), 30 / 32
+    inverse = analysis.moments(solved, orders=(-1,)).squeeze()
+    exact = -np.log(1 - x) / x / 16**2
+    assert inverse["lower"] < exact < inverse["upper"]
     # up to the largest size, all is exact
     assert np.allclose(found["moment"].sel(order=2, time=1), ds["moment"].sel(order=2, time=1))
     assert np.all(found["lower"].sel(order=-1) <= found["upper"].sel(order=-1))

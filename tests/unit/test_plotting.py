@@ -151,6 +151,8 @@ def test_moments_show_means_and_their_intervals(many):
     assert np.array_equal(x, TIMES[1:])
     assert np.allclose(y, mean[1:])
     assert np.allclose(half, (upper - lower)[1:] / 2)
+    ends = [s[:, 1] for s in ax.containers[0][2][0].get_segments()]
+    assert np.allclose(ends, np.stack([lower, upper], axis=1)[1:])
     (line,) = [line for line in ax.lines if line.get_linestyle() == "-"]
     assert np.allclose(line.get_ydata(), 1 + line.get_xdata())
 
@@ -226,9 +228,12 @@ def test_comparison_measures_by_the_solver(many, solved):
     figure = plotting.comparison({"a": many, "solver": solved, "b": many})
     both = bars(figure.axes[1])
     assert len(both) == 2
-    known = 100 * (many["number_density"].mean("replica").values / (2 / (TIMES + 2)) - 1)
-    for x, y, _ in both:
+    percent = 100 * (TIMES + 2) / 2
+    known = percent * many["number_density"].mean("replica").values - 100
+    lower, upper = mean_interval(Sample.of(many["number_density"].values))
+    for x, y, half in both:
         assert np.allclose(y, known[1:])
+        assert np.allclose(half, (percent * (upper - lower) / 2)[1:])
         assert np.allclose(x, TIMES[1:], rtol=0.05)
     # side by side
     assert np.all(both[0][0] < both[1][0])
@@ -252,6 +257,13 @@ def test_the_scaled_form_does_not_depend_on_the_mass(solved):
     assert len(both[0]) == 4
     for one, two in zip(*both, strict=True):
         np.testing.assert_allclose(one.get_xydata(), two.get_xydata(), rtol=1e-12, atol=1e-300)
+
+
+def test_the_cycle_of_an_oscillation_begins_at_the_start_that_is_given(many):
+    _, cycle = plotting.oscillations(many, start=1.0).axes
+    late = many.isel(replica=0, time=TIMES >= 1.0)
+    np.testing.assert_array_equal(cycle.lines[0].get_xdata(), late["number_density"])
+    np.testing.assert_array_equal(cycle.lines[0].get_ydata(), late["moment"].sel(order=2))
 
 
 def test_own_axes(many):
