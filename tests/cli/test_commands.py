@@ -12,7 +12,7 @@ from command import call
 
 import smolux
 from smolux.case import load, parse, spatial
-from smolux.cli import catalogue, comparing, estimate, templates
+from smolux.cli import catalogue, comparing, estimate, showing, templates
 from smolux.errors import InputError, OutOfMemoryError, WorkerError
 from smolux.kernels import KERNELS
 
@@ -232,6 +232,8 @@ def test_show_and_plot(folder):
 def test_show_cuts_long_tables(folder):
     call("run", "small.toml", "--set", "run.times={stop=1, count=40}", "-o", "long")
     assert "12 of 40 times are shown" in call("show", "long").stdout
+    shown = showing.chosen(smolux.results.load(folder / "long" / "results.nc"), 12)["time"].values
+    assert (len(shown), shown[0], shown[-1]) == (12, 0.0, 1.0)
     whole = call("show", "long", "--all").stdout
     assert "are shown" not in whole
     assert whole.count("\n") > 80
@@ -277,7 +279,9 @@ def test_compare_says_the_warnings_of_each_method(folder):
 def test_what_is_compared_is_independent_and_alike(folder, monkeypatch):
     """Each method has a seed of its own, and a gel reacts as in a simulation."""
     given = []
-    made = xr.Dataset(attrs={"complete": 1, "compile_seconds": 2.0, "wall_seconds": 5.0, "events": 9})
+    made = xr.Dataset(
+        attrs={"complete": 1, "compile_seconds": 2.0, "wall_seconds": 5.0, "events": 9}
+    )
 
     def computed(_: object, *times: object, **settings: object) -> xr.Dataset:
         given.append(settings)

@@ -270,9 +270,7 @@ class TestGelation:
         dense = exact.Multiplicative(2.0)
         assert dense.gel_time == 0.5
         np.testing.assert_allclose(dense.gel_mass(t / 2), 2 * (1 - sol), rtol=1e-14)
-        np.testing.assert_allclose(
-            dense.collisions(t / 2), 2 - dense.moment(t / 2, 0), rtol=1e-14
-        )
+        np.testing.assert_allclose(dense.collisions(t / 2), 2 - dense.moment(t / 2, 0), rtol=1e-14)
         assert dense.moment([0.25, 1.0], 1, gel=True).tolist() == [2.0, 2.0]
 
     def test_stockmayer(self) -> None:

@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 import smolux as sx
 from shared import FORMULA
 from smolux import analysis
+from smolux.analysis.periodicity import chance_of_noise
 
 DATA = Path(__file__).parents[1] / "reference" / "data"
 
@@ -25,7 +26,9 @@ def test_moments_from_sizes_and_bins():
         assert np.all(exact <= found["upper"].sel(order=p) * (1 + 1e-12))
         assert np.allclose(found["moment"].sel(order=p), exact, rtol=0.08)
     # where a bin holds a single size, too
-    narrow = ds.assign_coords(bin=ds["bin_lower"].values, bin_upper=("bin", ds["bin_lower"].values + 1))
+    narrow = ds.assign_coords(
+        bin=ds["bin_lower"].values, bin_upper=("bin", ds["bin_lower"].values + 1)
+    )
     one = analysis.moments(narrow, orders=(-1, 2))
     for bound in ("lower", "upper"):
         assert np.allclose(one[bound], one["moment"], rtol=1e-12)
@@ -125,6 +128,14 @@ def test_the_noise_of_an_equilibrium_does_not_last(rho):
     swing = 3 * np.sin(2 * np.pi * t / 33 + drift) / np.sqrt(1 - rho**2)
     found = analysis.oscillations(oscillating(100 + swing + autoregressive(10, 400, rho, 7), t))
     assert np.all(found["chance"] < 1e-3)
+
+
+def test_noise_without_a_period_is_taken_for_one_as_often_as_said():
+    """Also where it is slow beside the series, and its correlation comes out too small."""
+    t = np.arange(100.0)
+    chance = np.array([chance_of_noise(t, y) for y in autoregressive(1000, 100, 0.95, 5)])
+    assert 0.03 < np.mean(chance < 0.05) < 0.1
+    assert 0.005 < np.mean(chance < 0.01) < 0.03
 
 
 def test_an_equilibrium_of_few_particles_has_no_period():
