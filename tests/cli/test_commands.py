@@ -195,9 +195,16 @@ def test_a_run_with_the_solver_says_whether_they_agree(folder):
 
 
 def test_the_solver_alone(folder):
-    (folder / "s.toml").write_text('[kernel]\nname = "constant"\n[solve]\ntimes = [1]\n')
+    (folder / "s.toml").write_text(
+        '[kernel]\nname = "constant"\nscale = "1 l/s"\n[initial]\ndensity = "1 l^-1"\n'
+        '[solve]\ntimes = ["1 s"]\n'
+    )
     result = call("run", "s.toml")
     assert "relative difference" in result.stdout
+    ds = smolux.results.load(folder / "s" / "results.nc")
+    assert float(ds["number_density"][0, 0]) == pytest.approx(1000 * 2 / 3)
+    for name, unit in (("time", "s"), ("volume", "m3"), ("moment", "m-3"), ("n", "m-3")):
+        assert ds[name].attrs["units"] == unit
     assert not (folder / "s" / "solution.nc").exists()
     assert call("show", "s").stdout == result.stdout
 

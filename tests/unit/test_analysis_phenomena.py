@@ -94,6 +94,8 @@ def test_whether_oscillations_last(rate, verdict):
     curves = curve + rng.standard_normal((6, len(t)))
     found = analysis.oscillations(oscillating(curves, t))
     assert found["verdict"].values.tolist() == [verdict] * 6
+    if rate == 0.0:
+        assert found.attrs["amplitude"] == pytest.approx(40, abs=1)
     if rate < 0.01:
         assert found.attrs["period"] == pytest.approx(33, abs=0.1)
         assert found.attrs["period_error"] < 0.2
