@@ -72,6 +72,22 @@ def test_energy_that_a_merge_loses(periodic):
         assert energy == pytest.approx(sp.system_of(periodic).kinetic_energy - lost, rel=1e-11)
 
 
+def test_where_and_how_two_discs_meet(periodic):
+    """Just before: both are their radius away from the point, and fly past at a known distance."""
+    events, s = periodic["events"].to_dataset(), sp.system_of(periodic)
+    for k in range(0, 399, 57):
+        now = sp.replay(periodic, float(events["time"][k]) * (1 - 1e-12))
+        x, v = now["position"].values, now["velocity"].values
+        both = [int(events[side][k]) for side in ("first", "second")]
+        away = s.box.nearest(events["point"].values[k] - x[both])
+        np.testing.assert_allclose(np.linalg.norm(away, axis=1), s.radius[both], rtol=1e-7)
+        d, w = away[0] - away[1], v[both[1]] - v[both[0]]
+        speed = np.linalg.norm(w)
+        assert float(events["relative_speed"][k]) == pytest.approx(speed)
+        impact = abs(d[0] * w[1] - d[1] * w[0]) / speed
+        assert float(events["impact_parameter"][k]) == pytest.approx(impact, rel=1e-6, abs=1e-9)
+
+
 def test_the_merger_tree_is_a_tree(lattice):
     events = lattice["events"].to_dataset()
     n = lattice.sizes["disc"]
