@@ -45,7 +45,8 @@ def test_a_run_with_stops_makes_the_merges_of_one_without(number, tmp_path):
 
 def test_what_is_reached_already():
     s = sp.lattice(36, 0.2, seed=1)
-    end = sp.simulate(s).assign_attrs(wall_seconds=1e6)
+    end = sp.simulate(s)
+    end.attrs["wall_seconds"] = 1e6
     again = sp.resume(end)
     assert again.attrs["wall_seconds"] > 1e6
     np.testing.assert_array_equal(again["position"], end["position"])

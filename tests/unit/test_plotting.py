@@ -1,5 +1,6 @@
 """Figures: they are made for every kind of result, show the right numbers and are fit for print."""
 
+import json
 import subprocess
 import sys
 
@@ -13,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 import smolux as sx
 from smolux import plotting
 from smolux.analysis.statistics import Sample, mean_interval
+from smolux.model_dict import model_to_dict
 from smolux.plotting.distribution import Classes
 
 TIMES = np.concatenate([[0.0], np.geomspace(0.1, 50, 9)])
@@ -257,6 +259,14 @@ def test_the_scaled_form_does_not_depend_on_the_mass(solved):
     assert len(both[0]) == 4
     for one, two in zip(*both, strict=True):
         np.testing.assert_allclose(one.get_xydata(), two.get_xydata(), rtol=1e-12, atol=1e-300)
+
+
+def test_the_exact_mass_of_rate_equations_is_without_the_gel(solved):
+    model = sx.Model(sx.kernels.Multiplicative())
+    ds = solved.assign_attrs(model=json.dumps(model_to_dict(model)), gel="inert")
+    exact = plotting.moments(ds, orders=(1,)).axes[0].lines[0]
+    assert len(exact.get_xdata()) > 100
+    np.testing.assert_allclose(exact.get_ydata(), np.minimum(1.0, 1.0 / exact.get_xdata()))
 
 
 def test_the_cycle_of_an_oscillation_begins_at_the_start_that_is_given(many):
