@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from smolux.deterministic.account import Account, Entry
 from smolux.deterministic.gel import may_gel
 from smolux.deterministic.lattice import on_multiples
 from smolux.deterministic.low_rank import LowRank
-from smolux.errors import InputError
+from smolux.errors import InputError, SmoluxWarning
 
 P = sx.processes
 AGGREGATION = P.Aggregation()
@@ -107,6 +109,10 @@ def test_what_makes_other_sizes_has_no_common_divisor():
     for process in (P.Shattering(0.1), P.Evaporation(0.1), P.Source({45: 1.0})):
         ds = sx.solve(sx.Model(K1, [AGGREGATION, process], start), [0.1])
         assert ds.attrs["unit"] == (15 if isinstance(process, P.Source) else 1)
+    # a window is that of the sizes, not of their numbers
+    with pytest.warns(SmoluxWarning, match="leave out window"):
+        ds = sx.solve(sx.Model(K1, [AGGREGATION], start), [10.0], window=120)
+    assert json.loads(ds.attrs["window"]) == [120]
 
 
 @pytest.mark.parametrize("law", [sx.kernels.Brownian(), sx.kernels.Additive(0.3)], ids=str)
@@ -136,9 +142,10 @@ def test_kernels_that_do_not_say_whether_they_gel(text, gels):
 def test_check_tells_the_error():
     model = sx.Model(K1, [AGGREGATION])
     ds = sx.solve(model, [1.0, 10.0], tolerance=1e-5, check=True)
-    exact = 2 / (2 + np.array([1.0, 10.0]))
-    error = np.abs(ds["number_density"].values[0] / exact - 1)
-    assert (ds["error"] > error).all()
+    t = np.array([1.0, 10.0])
+    for order, exact in ((0, 2 / (2 + t)), (2, 1 + t), (3, 1 + 3 * t + 1.5 * t**2)):
+        error = np.abs(ds["moment"].sel(order=order).values[0] / exact - 1)
+        assert (ds["error"] > error).all(), order
     assert (ds["error"] < 1e-3).all()
     with pytest.raises(InputError, match="check = 2"):
         sx.solve(model, [1.0], check=2)

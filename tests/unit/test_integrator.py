@@ -108,6 +108,9 @@ def test_norm_bounds_the_moments():
         relative = abs(error @ sizes**order) / (n @ sizes**order)
         assert relative <= norm(error, n) * (1 + 1e-12)
     assert norm(1e-3 * n, n) == pytest.approx(1e-3)
+    # what is wrong with the largest sizes counts most in the highest moment
+    wrong = n * (sizes > 90)
+    assert norm(wrong, n) == pytest.approx(wrong @ sizes**4 / (n @ sizes**4))
 
 
 def test_window_grows_in_time():
@@ -230,6 +233,7 @@ def test_dataset():
     np.testing.assert_allclose(ds["moment"].sel(order=0), ds["number_density"], rtol=1e-12)
     mass = ds["moment"].sel(order=1)[0] + 10.0 * np.array(json.loads(ds.attrs["mass_beyond"]))
     np.testing.assert_allclose(mass, 10.0, rtol=1e-12)
+    np.testing.assert_allclose(json.loads(ds.attrs["mass_error"]), 0.0, atol=1e-8)
     # the bins of a simulation, as many as there is something in
     plan = make_plan(model, [1.0], "inverse", "number", "doubling", 9, 1, 1, (0,), 16, 2, False)
     np.testing.assert_array_equal(ds["bin_lower"], plan.grid.edges[: ds.sizes["bin"]])
