@@ -31,6 +31,10 @@ def test_entries_add_up_to_what_is_missing():
     assert account.problem is None
     account.add(Entry(1.25, 1.0 + 4e-7, -0.25, -0.25, -0.25), nothing)
     assert "number of particles" in account.problem
+    less = Account(1e-8, 2.0, 5.0)
+    less.add(Entry(2.0, 2.0, 0.0, 0.0, 0.0), Entry(5.0, 4.0 + 1e-6, -1.0, -1.0, -1.0))
+    assert less.mass == pytest.approx(2e-7)
+    assert "the mass differs" in less.problem
     assert account.closes(nothing)
     assert not account.closes(nothing, Entry(1.0, 1.0, 0.0, 1e-7, 0.0))
 
