@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ import smolux as sx
 from smolux.deterministic import SolverError
 from smolux.deterministic import terms as terms_module
 from smolux.deterministic.account import Account, Entry
+from smolux.deterministic.arguments import Settings
 from smolux.deterministic.gel import may_gel
 from smolux.deterministic.lattice import on_multiples
 from smolux.deterministic.low_rank import LowRank
+from smolux.deterministic.solver import with_error
 from smolux.errors import InputError, SmoluxWarning
 
 P = sx.processes
@@ -153,6 +156,18 @@ def test_check_tells_the_error():
     assert (ds["error"] < 1e-3).all()
     with pytest.raises(InputError, match="check = 2"):
         sx.solve(model, [1.0], check=2)
+
+
+def test_the_error_is_that_of_the_worst_moment(monkeypatch):
+    model = sx.Model(K1)
+    ds = sx.solve(model, [1.0], sizes=8)
+    other = ds.copy(deep=True)
+    other["moment"].loc[{"order": 3.0}] *= 1.001
+    monkeypatch.setattr(
+        "smolux.deterministic.solver.Run", lambda *_, **__: SimpleNamespace(dataset=lambda: other)
+    )
+    settings = Settings((1.0,), "auto", 1e-8, None, None, ds["order"].values, 8, 4, "inert")
+    np.testing.assert_allclose(with_error(ds, model, settings)["error"], 1e-3, rtol=1e-9)
 
 
 def test_former_names():
