@@ -7,11 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import xarray as xr
 from command import call
 
 import smolux
 from smolux.case import load, parse, spatial
-from smolux.cli import catalogue, estimate, templates
+from smolux.cli import catalogue, comparing, estimate, showing, templates
 from smolux.errors import InputError, OutOfMemoryError, WorkerError
 from smolux.kernels import KERNELS
 
@@ -194,9 +195,16 @@ def test_a_run_with_the_solver_says_whether_they_agree(folder):
 
 
 def test_the_solver_alone(folder):
-    (folder / "s.toml").write_text('[kernel]\nname = "constant"\n[solve]\ntimes = [1]\n')
+    (folder / "s.toml").write_text(
+        '[kernel]\nname = "constant"\nscale = "1 l/s"\n[initial]\ndensity = "1 l^-1"\n'
+        '[solve]\ntimes = ["1 s"]\n'
+    )
     result = call("run", "s.toml")
     assert "relative difference" in result.stdout
+    ds = smolux.results.load(folder / "s" / "results.nc")
+    assert float(ds["number_density"][0, 0]) == pytest.approx(1000 * 2 / 3)
+    for name, unit in (("time", "s"), ("volume", "m3"), ("moment", "m-3"), ("n", "m-3")):
+        assert ds[name].attrs["units"] == unit
     assert not (folder / "s" / "solution.nc").exists()
     assert call("show", "s").stdout == result.stdout
 
@@ -231,6 +239,8 @@ def test_show_and_plot(folder):
 def test_show_cuts_long_tables(folder):
     call("run", "small.toml", "--set", "run.times={stop=1, count=40}", "-o", "long")
     assert "12 of 40 times are shown" in call("show", "long").stdout
+    shown = showing.chosen(smolux.results.load(folder / "long" / "results.nc"), 12)["time"].values
+    assert (len(shown), shown[0], shown[-1]) == (12, 0.0, 1.0)
     whole = call("show", "long", "--all").stdout
     assert "are shown" not in whole
     assert whole.count("\n") > 80
@@ -273,9 +283,39 @@ def test_compare_says_the_warnings_of_each_method(folder):
     assert "acceptance-rejection: warning: 3 of 3 replicas ended as one cluster" in found
 
 
-def test_compare_ends_with_1_if_a_method_differs(folder, monkeypatch):
-    from smolux.cli import comparing
+def test_what_is_compared_is_independent_and_alike(folder, monkeypatch):
+    """Each method has a seed of its own, and a gel reacts as in a simulation."""
+    given = []
+    made = xr.Dataset(
+        attrs={"complete": 1, "compile_seconds": 2.0, "wall_seconds": 5.0, "events": 9}
+    )
 
+    def computed(_: object, *times: object, **settings: object) -> xr.Dataset:
+        given.append(settings)
+        return made
+
+    monkeypatch.setattr(smolux, "simulate", computed)
+    monkeypatch.setattr(comparing, "solve", computed)
+    case = load("small.toml", ["kernel.name=multiplicative"])
+    found = comparing.compute(case, ["inverse", "size-class", "solver"])
+    assert [settings.get("seed") for settings in given] == [7, 8, None]
+    assert [settings.get("method") for settings in given] == ["inverse", "size-class", None]
+    assert given[-1]["gel"] == "reacts"
+    # without what it took to compile
+    assert [each.seconds for each in found[:2]] == [3.0, 3.0]
+
+
+def test_methods_share_the_level_of_a_table(monkeypatch):
+    test = {"p_value": 0.004, "p_total": 0.5, "p_largest": 1.0, "found_beyond": 6.0}
+    test |= {"largest_sigmas": 2.0, "where": "number_density"}
+    monkeypatch.setattr(comparing.analysis, "compare", lambda *_: xr.Dataset(attrs=test))
+    monkeypatch.setattr(comparing, "reference", lambda _: (comparing.EXACT, comparing.EXACT))
+    found = [comparing.Computed(name, None, 1.0, 0.0, 1.0) for name in ("one", "two", "three")]
+    for count in (1, 2, 3):
+        assert comparing.rows(found[:count])[2] == (count > 1)
+
+
+def test_compare_ends_with_1_if_a_method_differs(folder, monkeypatch):
     for agree, code in ((False, 1), (True, 0)):
         monkeypatch.setattr(comparing, "rows", lambda found, a=agree: (comparing.EXACT, [], a))
         call("compare", "small.toml", "-m", "acceptance-rejection", code=code)

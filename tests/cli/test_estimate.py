@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,7 +43,7 @@ def test_other_starts_and_unknown_kernels():
     (warning,) = estimate.physics_warnings(
         case('name = "multiplicative"', rest='[initial]\nname = "exponential"\nmean = 5')
     )
-    assert "sooner" in warning
+    assert "monomers of the same mass at t = 0.2, this initial condition sooner" in warning
     (warning,) = estimate.physics_warnings(case('formula = "i*j"\ndegree = 2'))
     assert "may gel" in warning
     (warning,) = estimate.physics_warnings(case('formula = "i*j"\ngels = true'))
@@ -155,6 +157,8 @@ def test_a_short_pilot_is_gone_on_with_as_it_grew():
     assert 4500 <= late.expected_collisions(doubling) < 10_000
     steady = small_pilot(times, [0, 1, 10, 100, 1000], [1.0] * 5, 1e8, merging=False)
     assert steady.expected_collisions(doubling) == pytest.approx(1e8)
+    more = replace(doubling, particles=7000)
+    assert steady.expected_collisions(more) == pytest.approx(7e8)
     fixed = case(
         'name = "constant"', 'times = [1e8]\nparticles = 1000\npopulation = "fixed-volume"'
     ).run

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from command import call
 
 from smolux import results
 from smolux.case import load, spatial
 from smolux.errors import InputError, SmoluxWarning
-from smolux.spatial import running, simulate
+from smolux.spatial import lognormal_radii, random, running, simulate
 
 CASE = """\
 title = "few discs"
@@ -72,6 +73,26 @@ def test_a_case_in_three_dimensions_without_a_seed_gets_one(folder):
     assert case.with_seed() is case
     (folder / "new.toml").write_text(CASE.replace("seed = 2\n", ""))
     assert spatial.load("new.toml").with_seed().run.seed is not None
+
+
+def test_every_setting_arrives(folder):
+    settings = {
+        "discs": 27, "dimension": 3, "initial": "random", "volume_fraction": 0.05, "seed": 4,
+        "walls": "periodic", "velocities": "maxwellian", "temperature": 2.5, "radius_sigma": 1.3,
+        "until": 3.0, "clusters": 2, "max_events": 7, "time_limit": 60.0,
+    }  # fmt: skip
+    run = spatial.load("few.toml", [f"spatial.{k}={v}" for k, v in settings.items()]).run
+    known = random(
+        27, 0.05, dimension=3, radii=lognormal_radii(1.3), walls="periodic",
+        velocities="maxwellian", temperature=2.5, seed=4,
+    )  # fmt: skip
+    made = run.system()
+    for name in ("position", "velocity", "radius", "mass"):
+        np.testing.assert_array_equal(getattr(made, name), getattr(known, name))
+    assert made.box == known.box
+    given = run.arguments()
+    for name in ("until", "clusters", "max_events", "time_limit"):
+        assert given[name] == settings[name]
 
 
 def test_all_mistakes_at_once_with_their_lines(folder):

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import smolux as sx
+from smolux import analysis
 from smolux.errors import SmoluxWarning
 
 DATA = Path(__file__).parents[1] / "reference" / "data"
@@ -157,19 +158,26 @@ def test_time_dependent_shattering():
 
 
 def test_gel_that_reacts_follows_flory():
+    """At the density 2.5 and K = 0.4 i j: as for 1 and i j, but 2.5 times as much of all."""
     values = [v for group in spot_values("E3F").values() for v in group]
+    model = sx.Model(sx.kernels.Multiplicative(0.4), initial=sx.initial.monodisperse(2.5))
     with pytest.warns(SmoluxWarning, match="Flory"):
-        ds = sx.solve(
-            sx.Model(sx.kernels.Multiplicative()), [1.5, 2.0], gel="reacts", max_window=512
-        )
+        ds = sx.solve(model, [1.5, 2.0], gel="reacts", max_window=512)
     for t, what, exact in values:
-        assert observed(ds, t, what) == pytest.approx(exact, rel=1e-6), (t, what)
+        assert observed(ds, t, what) == pytest.approx(2.5 * exact, rel=1e-6), (t, what)
+    # each collision takes one cluster away, also with the gel; of two that make one beyond the
+    # window both are gone
+    np.testing.assert_allclose(ds["collisions"], 2.5 - ds["number_density"], rtol=2e-4)
+    share = analysis.gel_fraction(ds).values[0]
+    np.testing.assert_allclose(share, 1 - np.exp(-ds["time"] * share), rtol=1e-6)
 
 
 def test_inert_gel_follows_stockmayer():
     with pytest.warns(SmoluxWarning, match="Stockmayer"):
         ds = sx.solve(sx.Model(sx.kernels.Multiplicative()), [1.5, 2.0], max_window=1024)
     np.testing.assert_allclose(ds["moment"].sel(order=1)[0], [1 / 1.5, 1 / 2], rtol=1e-6)
+    exact = sx.summary(ds)["moment"].sel(statistic="exact", order=1)
+    np.testing.assert_allclose(exact, [1 / 1.5, 1 / 2], rtol=1e-12)
     # the densities at the gel time over t, but for the truncation: an error of order M**-3/2 x M
     np.testing.assert_allclose(ds["number_density"][0], [1 / 3, 1 / 4], rtol=5e-3)
 

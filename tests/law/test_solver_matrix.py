@@ -169,6 +169,9 @@ def test_sources_of_any_size(rates, initial, t):
     np.testing.assert_allclose(
         ds["events"].sel(process="source").values[0], flux * times, rtol=CLOSE
     )
+    # what comes in collides with nothing
+    collisions = ds["events"].sel(process="aggregation").values
+    np.testing.assert_array_equal(ds["collisions"].values, collisions)
     right = [closed.riccati(initial.total, flux, 0.0, 0.5, s) for s in times]
     np.testing.assert_allclose(number(ds), right, rtol=CLOSE)
 

@@ -11,8 +11,9 @@ from smolux.deterministic import SolverError, eigenvalues, hopf_threshold, stead
 from smolux.errors import InputError
 
 
-def model(kernel, rate):
-    return sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(rate)])
+def model(kernel, rate, initial=None):
+    processes = [sx.processes.Aggregation(), sx.processes.Shattering(rate)]
+    return sx.Model(kernel, processes, initial=initial or sx.initial.monodisperse())
 
 
 def catalan(k, lam):
@@ -23,14 +24,16 @@ def catalan(k, lam):
 
 
 def test_constant_kernel():
+    """Of the mass 2.5, in triplets at the start."""
     lam = 0.1
-    state = steady_state(model(sx.kernels.Constant(), lam))
+    initial = sx.initial.monodisperse(2.5 / 3, size=3)
+    state = steady_state(model(sx.kernels.Constant(), lam, initial))
     k = np.arange(1.0, 201.0)
     exact = 2 * lam * (1 + lam) / (1 + 2 * lam) * catalan(k, lam)
-    np.testing.assert_allclose(state.n[:200], exact, rtol=1e-8)
-    assert state.moment(0) == pytest.approx(2 * lam / (1 + 2 * lam), rel=1e-10)
-    assert state.moment(2) == pytest.approx(61, rel=1e-8)
-    assert state.moment(1) == pytest.approx(1, rel=1e-12)
+    np.testing.assert_allclose(state.n[:200], 2.5 * exact, rtol=1e-8)
+    assert state.moment(0) == pytest.approx(2.5 * 2 * lam / (1 + 2 * lam), rel=1e-10)
+    assert state.moment(2) == pytest.approx(2.5 * 61, rel=1e-8)
+    assert state.moment(1) == pytest.approx(2.5, rel=1e-12)
 
 
 def test_multiplicative_kernel():

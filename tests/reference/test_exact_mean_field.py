@@ -266,6 +266,12 @@ class TestGelation:
         assert solution.moment([0.5, 2.0], 2, gel=True).tolist() == [2.0, math.inf]
         # each event takes one cluster away, the gel's too
         np.testing.assert_allclose(solution.collisions(t), 1 - solution.moment(t, 0), rtol=1e-15)
+        # twice as dense, all is twice as much after half the time
+        dense = exact.Multiplicative(2.0)
+        assert dense.gel_time == 0.5
+        np.testing.assert_allclose(dense.gel_mass(t / 2), 2 * (1 - sol), rtol=1e-14)
+        np.testing.assert_allclose(dense.collisions(t / 2), 2 - dense.moment(t / 2, 0), rtol=1e-14)
+        assert dense.moment([0.25, 1.0], 1, gel=True).tolist() == [2.0, 2.0]
 
     def test_stockmayer(self) -> None:
         solution = exact.Multiplicative(gel="inert")

@@ -205,6 +205,11 @@ def test_table_and_figure(measured: Any, tmp_path: Path):
     assert "weight-function=1" in text
     figure = sx.plotting.efficiency(measured)
     assert len(figure.axes) == 2
+    last = measured.isel(time=-1)
+    for ax, name in zip(figure.axes, last["observable"].values, strict=True):
+        ends = [bar[2][0].get_segments()[0][:, 0] for bar in ax.containers]
+        known = [last[v].sel(observable=name) for v in ("ratio_lower", "ratio_upper")]
+        np.testing.assert_allclose(ends, np.stack(known, axis=1))
     assert sx.plotting.save(figure, tmp_path / "eff.png").stat().st_size > 5000
 
 

@@ -146,6 +146,17 @@ class TestOrder:
         z = (factor["S"].values - 1) * np.sqrt(factor["vectors"].values)
         assert np.abs(z).max() < 4.5
 
+    @pytest.mark.parametrize(
+        ("d", "share"), [(2, np.pi - 8 / 3 + 1 / 2), (3, (4 / 3 - 3 / 2) * np.pi + 8 / 5 - 1 / 6)]
+    )
+    def test_what_is_expected_between_walls(self, d, share):
+        """Two points of a square or a cube are nearer than its side with a known probability."""
+        x = 0.5 + 0.01 * np.eye(3, d)
+        g = sp.pair_distribution(sp.Snapshot(x, 1e-3, sp.Box((1,) * d)), [0, 1])
+        # each of three has two neighbours, where independent ones would have twice the share
+        np.testing.assert_allclose(g["neighbours"], 2.0)
+        np.testing.assert_allclose(g["g"], 1 / share, rtol=1e-12)
+
     def test_pair_counts_against_all_pairs(self):
         rng = np.random.default_rng(3)
         s = sp.Snapshot(
@@ -160,11 +171,13 @@ class TestOrder:
     def test_structure_factor_against_the_sum(self):
         rng = np.random.default_rng(4)
         x = rng.uniform(size=(40, 2)) * (2, 4)
-        factor = sp.structure_factor(sp.Snapshot(x, 0.1, sp.Box((2, 4))), shells=1)
-        vectors = 2 * np.pi * np.array([[0, 1 / 4]])  # the only one of the first shell
-        expected = np.abs(np.exp(1j * x @ vectors.T).sum(0)) ** 2 / 40
-        np.testing.assert_allclose(factor["S"].values, expected, rtol=1e-12)
-        np.testing.assert_allclose(factor["q"].values, [np.pi / 2], rtol=1e-12)
+        factor = sp.structure_factor(sp.Snapshot(x, 0.1, sp.Box((2, 4))), shells=2)
+        # one vector in the first shell, and of lengths of 2 and sqrt(5) four in the second
+        numbers = np.array([[0, 1], [0, 2], [1, 0], [1, 1], [1, -1]])
+        power = np.abs(np.exp(2j * np.pi * x @ (numbers / (2, 4)).T).sum(0)) ** 2 / 40
+        np.testing.assert_allclose(factor["S"], [power[0], power[1:].mean()], rtol=1e-12)
+        length = np.array([1, (2 + np.sqrt(5)) / 2])
+        np.testing.assert_allclose(factor["q"], np.pi / 2 * length, rtol=1e-12)
 
     def test_bragg_peaks(self):
         factor = sp.structure_factor(square(16), shells=16)

@@ -132,8 +132,24 @@ def test_figures(result):
     drawn = plotting.discs(result, 1.0).axes[0].collections[0]
     x = sp.system_of(result).box.wrap(sp.replay(result, 1.0)["position"])
     np.testing.assert_allclose(drawn.get_offsets(), x)
+    # diameters, in the units of the box
+    np.testing.assert_allclose(drawn.get_widths(), 2 * result["radius"])
     with pytest.raises(sx.InputError, match="colour = 'red'"):
         plotting.discs(result, colour="red")
+
+
+def test_the_mean_field_is_drawn_in_numbers_of_the_box():
+    """Beside K = 1, for which the share of the size k is p (1 - p)**(k - 1)."""
+    tree = sp.simulate(sp.lattice(36, 0.3, seed=2), times=[0.0, 1.0, 4.0])
+    mixed = sx.solve(sx.Model(sx.kernels.Constant()), [0.0, 1.0, 4.0])
+    top, bottom = plotting.mean_field([(tree, mixed)]).axes
+    box, well_mixed = top.lines
+    np.testing.assert_array_equal(box.get_ydata(), tree["series/clusters"])
+    np.testing.assert_allclose(well_mixed.get_ydata(), 36 * 2 / (2 + np.array([0.0, 1.0, 4.0])))
+    p = 2 / (2 + 4.0)
+    edges = tree["series/bin_lower"].values, tree["series/bin_upper"].values
+    share = [(1 - p) ** (a - 1) - (1 - p) ** (b - 1) for a, b in zip(*edges, strict=True)]
+    np.testing.assert_allclose(bottom.lines[-1].get_ydata(), share / np.subtract(*edges[::-1]))
 
 
 def test_figures_of_order_and_of_dimensions(result):

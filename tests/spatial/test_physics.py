@@ -72,6 +72,22 @@ def test_energy_that_a_merge_loses(periodic):
         assert energy == pytest.approx(sp.system_of(periodic).kinetic_energy - lost, rel=1e-11)
 
 
+def test_where_and_how_two_discs_meet(periodic):
+    """Just before: both are their radius away from the point, and fly past at a known distance."""
+    events, s = periodic["events"].to_dataset(), sp.system_of(periodic)
+    for k in range(0, 399, 57):
+        now = sp.replay(periodic, float(events["time"][k]) * (1 - 1e-12))
+        x, v = now["position"].values, now["velocity"].values
+        both = [int(events[side][k]) for side in ("first", "second")]
+        away = s.box.nearest(events["point"].values[k] - x[both])
+        np.testing.assert_allclose(np.linalg.norm(away, axis=1), s.radius[both], rtol=1e-7)
+        d, w = away[0] - away[1], v[both[1]] - v[both[0]]
+        speed = np.linalg.norm(w)
+        assert float(events["relative_speed"][k]) == pytest.approx(speed)
+        impact = abs(d[0] * w[1] - d[1] * w[0]) / speed
+        assert float(events["impact_parameter"][k]) == pytest.approx(impact, rel=1e-6, abs=1e-9)
+
+
 def test_the_merger_tree_is_a_tree(lattice):
     events = lattice["events"].to_dataset()
     n = lattice.sizes["disc"]
@@ -84,6 +100,14 @@ def test_the_merger_tree_is_a_tree(lattice):
         size[n + m] = size[a] + size[b]
     assert (np.diff(events["time"].values) >= 0).all()
     assert (events["impact_parameter"].values <= 2 * lattice["radius"].values[0] * (1 + 1e-9)).all()
+
+
+def test_the_first_contact_of_each_disc(lattice):
+    events = lattice["events"].to_dataset()
+    first = np.full(lattice.sizes["disc"], np.inf)
+    for side in ("first", "second"):
+        np.minimum.at(first, events[side].values, events["time"].values)
+    np.testing.assert_array_equal(lattice["first_contact"], first)
 
 
 def test_replay_gives_any_instant(lattice, periodic):
@@ -105,12 +129,15 @@ def test_replay_gives_any_instant(lattice, periodic):
 def test_series_from_the_clusters_of_each_time(periodic):
     series = periodic["series"].to_dataset()
     for k, time in enumerate(series["time"].values):
-        _, sizes = np.unique(sp.replay(periodic, float(time))["cluster"], return_counts=True)
+        cluster = sp.replay(periodic, float(time))["cluster"].values
+        _, sizes = np.unique(cluster, return_counts=True)
         assert series["clusters"].values[k] == len(sizes)
         assert series["largest"].values[k] == sizes.max()
         np.testing.assert_allclose(series["moment"].values[k], [(sizes**p).sum() for p in range(4)])
         assert series["n_bin"].values[k].sum() == len(sizes)
         assert series["mean_mass"].values[k] == pytest.approx(400 / len(sizes))
+        heaviest = np.bincount(cluster, periodic["mass"].values).max()
+        assert series["largest_mass"].values[k] == pytest.approx(heaviest)
 
 
 def test_files_keep_everything(lattice, tmp_path):

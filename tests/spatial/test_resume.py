@@ -46,7 +46,9 @@ def test_a_run_with_stops_makes_the_merges_of_one_without(number, tmp_path):
 def test_what_is_reached_already():
     s = sp.lattice(36, 0.2, seed=1)
     end = sp.simulate(s)
+    end.attrs["wall_seconds"] = 1e6
     again = sp.resume(end)
+    assert again.attrs["wall_seconds"] > 1e6
     np.testing.assert_array_equal(again["position"], end["position"])
     np.testing.assert_array_equal(merges(again)[0], merges(end)[0])
     with pytest.raises(sx.InputError, match=r"until = 0\.1: the run has reached"):

@@ -105,6 +105,29 @@ def test_radii_of_a_law():
     assert np.log(drawn).std() == pytest.approx(np.log(1.5), abs=4 * np.log(1.5) / np.sqrt(20_000))
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_discs_of_two_sizes_are_of_one_density_and_temperature(dimension):
+    s = sp.random(
+        2000, 0.1, dimension=dimension, radii=sp.bimodal_radii(3.0, 0.5), velocities="maxwellian",
+        temperature=2.0, seed=4,
+    )  # fmt: skip
+    assert s.volume_fraction == pytest.approx(0.1)
+    small, large = np.unique(s.radius)
+    assert large == pytest.approx(3 * small)
+    mass = [s.mass[s.radius == r] for r in (small, large)]
+    assert mass[1][0] == pytest.approx(3**dimension * mass[0][0])
+    for m, r in zip(mass, (small, large), strict=True):
+        # to 4 sigma of the sample variance
+        found = np.mean(m[:, None] * s.velocity[s.radius == r] ** 2)
+        assert found == pytest.approx(2, abs=4 * 2 * np.sqrt(2 / (1000 * dimension)))
+
+
+def test_nearest_images_along_axes_of_different_sides():
+    box = sp.Box((10, 4, 3), walls=("periodic", "periodic", "reflecting"))
+    np.testing.assert_allclose(box.nearest([[36.0, -9.5, 2.9]]), [[-4.0, -1.5, 2.9]])
+    np.testing.assert_allclose(box.wrap([[36.0, -9.5, 2.9]]), [[6.0, 2.5, 2.9]])
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [

@@ -50,6 +50,8 @@ def assert_sound(result: xr.DataTree, discs: int) -> None:
     events = result["events"].to_dataset()
     assert sorted(events["parents"].values.ravel()) == list(range(2 * discs - 2))
     assert events["sizes"].values[-1].sum() == discs
+    mass = np.concatenate([result["mass"].values, events["masses"].values.sum(1)])
+    np.testing.assert_allclose(events["masses"], mass[events["parents"].values])
     assert (np.diff(events["time"].values) >= 0).all()
 
 
@@ -171,11 +173,12 @@ def test_two_discs_follow_the_exact_motion_until_they_meet():
 
 
 def test_walls_turn_clusters_back():
-    s = sp.System([[1, 1], [0.6, 3.4]], [[1, 0.5], [0, 0]], radius=0.5, box=4)
+    """Along either axis, whatever their mass."""
+    s = sp.System([[1, 1], [0.6, 3.4]], [[1, 0.5], [0, 0.5]], radius=0.5, mass=[1, 9], box=4)
     result = sp.simulate(s, TimeStepping(step=0.3), until=2.9, times=[0.0])
-    np.testing.assert_allclose(result["position"][0], [3.1, 2.45], atol=1e-12)
-    np.testing.assert_allclose(result["velocity"][0], [-1, 0.5], atol=1e-12)
-    assert result["walls"]["wall_axis"].values.tolist() == [0]
+    np.testing.assert_allclose(result["position"], [[3.1, 2.45], [0.6, 2.15]], atol=1e-12)
+    np.testing.assert_allclose(result["velocity"], [[-1, 0.5], [0, -0.5]], atol=1e-12)
+    assert result["walls"]["wall_axis"].values.tolist() == [1, 0]
 
 
 def test_failures_are_counted_and_the_run_goes_on_with_shorter_steps():

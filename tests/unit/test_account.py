@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -9,10 +12,12 @@ import smolux as sx
 from smolux.deterministic import SolverError
 from smolux.deterministic import terms as terms_module
 from smolux.deterministic.account import Account, Entry
+from smolux.deterministic.arguments import Settings
 from smolux.deterministic.gel import may_gel
 from smolux.deterministic.lattice import on_multiples
 from smolux.deterministic.low_rank import LowRank
-from smolux.errors import InputError
+from smolux.deterministic.solver import with_error
+from smolux.errors import InputError, SmoluxWarning
 
 P = sx.processes
 AGGREGATION = P.Aggregation()
@@ -29,6 +34,10 @@ def test_entries_add_up_to_what_is_missing():
     assert account.problem is None
     account.add(Entry(1.25, 1.0 + 4e-7, -0.25, -0.25, -0.25), nothing)
     assert "number of particles" in account.problem
+    less = Account(1e-8, 2.0, 5.0)
+    less.add(Entry(2.0, 2.0, 0.0, 0.0, 0.0), Entry(5.0, 4.0 + 1e-6, -1.0, -1.0, -1.0))
+    assert less.mass == pytest.approx(2e-7)
+    assert "the mass differs" in less.problem
     assert account.closes(nothing)
     assert not account.closes(nothing, Entry(1.0, 1.0, 0.0, 1e-7, 0.0))
 
@@ -107,12 +116,17 @@ def test_what_makes_other_sizes_has_no_common_divisor():
     for process in (P.Shattering(0.1), P.Evaporation(0.1), P.Source({45: 1.0})):
         ds = sx.solve(sx.Model(K1, [AGGREGATION, process], start), [0.1])
         assert ds.attrs["unit"] == (15 if isinstance(process, P.Source) else 1)
+    # a window is that of the sizes, not of their numbers
+    with pytest.warns(SmoluxWarning, match="leave out window"):
+        ds = sx.solve(sx.Model(K1, [AGGREGATION], start), [10.0], window=120)
+    assert json.loads(ds.attrs["window"]) == [120]
 
 
-def test_kernel_on_multiples():
-    kernel = on_multiples(sx.kernels.Brownian(), 7)
+@pytest.mark.parametrize("law", [sx.kernels.Brownian(), sx.kernels.Additive(0.3)], ids=str)
+def test_kernel_on_multiples(law):
+    kernel = on_multiples(law, 7)
     i = np.array([1.0, 2.0, 5.0])
-    np.testing.assert_array_equal(kernel(i, 3.0), sx.kernels.Brownian()(7 * i, 21.0))
+    np.testing.assert_array_equal(kernel(i, 3.0), law(7 * i, 21.0))
     left, right = kernel.factors(i)
     np.testing.assert_allclose((left.T @ right), kernel(i[:, None], i[None, :]), rtol=1e-13)
 
@@ -135,12 +149,25 @@ def test_kernels_that_do_not_say_whether_they_gel(text, gels):
 def test_check_tells_the_error():
     model = sx.Model(K1, [AGGREGATION])
     ds = sx.solve(model, [1.0, 10.0], tolerance=1e-5, check=True)
-    exact = 2 / (2 + np.array([1.0, 10.0]))
-    error = np.abs(ds["number_density"].values[0] / exact - 1)
-    assert (ds["error"] > error).all()
+    t = np.array([1.0, 10.0])
+    for order, exact in ((0, 2 / (2 + t)), (2, 1 + t), (3, 1 + 3 * t + 1.5 * t**2)):
+        error = np.abs(ds["moment"].sel(order=order).values[0] / exact - 1)
+        assert (ds["error"] > error).all(), order
     assert (ds["error"] < 1e-3).all()
     with pytest.raises(InputError, match="check = 2"):
         sx.solve(model, [1.0], check=2)
+
+
+def test_the_error_is_that_of_the_worst_moment(monkeypatch):
+    model = sx.Model(K1)
+    ds = sx.solve(model, [1.0], sizes=8)
+    other = ds.copy(deep=True)
+    other["moment"].loc[{"order": 3.0}] *= 1.001
+    monkeypatch.setattr(
+        "smolux.deterministic.solver.Run", lambda *_, **__: SimpleNamespace(dataset=lambda: other)
+    )
+    settings = Settings((1.0,), "auto", 1e-8, None, None, ds["order"].values, 8, 4, "inert")
+    np.testing.assert_allclose(with_error(ds, model, settings)["error"], 1e-3, rtol=1e-9)
 
 
 def test_former_names():

@@ -37,6 +37,19 @@ def test_of_infinitely_many_particles_the_estimate_is_exact(kernel: Any) -> None
     assert (off <= told + 1e-6).all()
 
 
+@pytest.mark.parametrize("weighting", [sx.weighting.Number(), sx.weighting.MassFlow()], ids=str)
+def test_a_particle_alone_meets_nothing(weighting: Any) -> None:
+    """One of size 7 in a volume of 5, whatever it stands for: it stays, and makes none of 14."""
+    ds = sx.solve(MODEL, np.linspace(0.0, 1.0, 5), sizes=20)
+    density = 1.0 / weighting.weights(np.array([7.0]))[0] / 5.0
+    ds["n"][:], ds["n_bin"][:], ds["volume"][:] = 0.0, 0.0, 5.0
+    ds["n"].loc[{"size": 7}] = density
+    ds["moment"].loc[{"order": 1}] = 7 * density
+    found = densities_by_rates(ds.assign_attrs(weighting=weighting.name), [7, 14])["n"]
+    np.testing.assert_allclose(found.sel(size=7), density, rtol=1e-12)
+    np.testing.assert_allclose(found.sel(size=14), 0.0, atol=1e-15)
+
+
 @pytest.mark.parametrize("q", [0.0, 0.5, 1.0])
 def test_the_mean_is_that_of_the_counts(q: float) -> None:
     """24 particles, so that pairs of a particle with itself would be seen."""

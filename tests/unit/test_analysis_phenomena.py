@@ -10,7 +10,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 import smolux as sx
+from shared import FORMULA
 from smolux import analysis
+from smolux.analysis.periodicity import chance_of_noise
 
 DATA = Path(__file__).parents[1] / "reference" / "data"
 
@@ -23,6 +25,18 @@ def test_moments_from_sizes_and_bins():
         assert np.all(found["lower"].sel(order=p) <= exact * (1 + 1e-12))
         assert np.all(exact <= found["upper"].sel(order=p) * (1 + 1e-12))
         assert np.allclose(found["moment"].sel(order=p), exact, rtol=0.08)
+    # where a bin holds a single size, too
+    narrow = ds.assign_coords(
+        bin=ds["bin_lower"].values, bin_upper=("bin", ds["bin_lower"].values + 1)
+    )
+    one = analysis.moments(narrow, orders=(-1, 2))
+    for bound in ("lower", "upper"):
+        assert np.allclose(one[bound], one["moment"], rtol=1e-12)
+    # sum_k x**k / k is a logarithm
+    solved, x = synthetic.solver_dataset(times=(30.0,)), 30 / 32
+    inverse = analysis.moments(solved, orders=(-1,)).squeeze()
+    exact = -np.log(1 - x) / x / 16**2
+    assert inverse["lower"] < exact < inverse["upper"]
     # up to the largest size, all is exact
     assert np.allclose(found["moment"].sel(order=2, time=1), ds["moment"].sel(order=2, time=1))
     assert np.all(found["lower"].sel(order=-1) <= found["upper"].sel(order=-1))
@@ -80,6 +94,8 @@ def test_whether_oscillations_last(rate, verdict):
     curves = curve + rng.standard_normal((6, len(t)))
     found = analysis.oscillations(oscillating(curves, t))
     assert found["verdict"].values.tolist() == [verdict] * 6
+    if rate == 0.0:
+        assert found.attrs["amplitude"] == pytest.approx(40, abs=1)
     if rate < 0.01:
         assert found.attrs["period"] == pytest.approx(33, abs=0.1)
         assert found.attrs["period_error"] < 0.2
@@ -116,11 +132,18 @@ def test_the_noise_of_an_equilibrium_does_not_last(rho):
     assert np.all(found["chance"] < 1e-3)
 
 
+def test_noise_without_a_period_is_taken_for_one_as_often_as_said():
+    """Also where it is slow beside the series, and its correlation comes out too small."""
+    t = np.arange(100.0)
+    chance = np.array([chance_of_noise(t, y) for y in autoregressive(1000, 100, 0.95, 5)])
+    assert 0.03 < np.mean(chance < 0.05) < 0.1
+    assert 0.005 < np.mean(chance < 0.01) < 0.03
+
+
 def test_an_equilibrium_of_few_particles_has_no_period():
     """500 particles under shattering; each replica swings by a tenth of its mean."""
-    model = sx.Model(
-        sx.kernels.Constant(), [sx.processes.Aggregation(), sx.processes.Shattering(0.1)]
-    )
+    kernel = sx.kernels.formula(FORMULA, c0=1.0, c1=0.0, c2=0.0, c3=0.0)
+    model = sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(0.1)])
     ds = sx.simulate(
         model, np.arange(0.0, 401.0), method="acceptance-rejection", particles=500, replicas=8,
         seed=1, sizes=8,
@@ -149,11 +172,17 @@ def test_series_names_what_there_is():
         analysis.series(ds, "n", size=65)
 
 
+def denser(ds, factor):
+    """The same particles in a smaller volume: all that is per volume is more, and comes sooner."""
+    ds = ds.assign(volume=ds["volume"] / factor).assign_coords(time=ds["time"] / factor)
+    return ds.assign({name: factor * ds[name] for name in ("number_density", "moment")})
+
+
 def random_graph(particles, times, replicas, seed=1):
     """Components of growing random graphs: the exact process of the multiplicative kernel."""
     rng = np.random.default_rng(seed)
     shape = (replicas, len(times))
-    moment, largest = np.empty((*shape, 3)), np.empty(shape)
+    moment, largest = np.empty((*shape, 4)), np.empty(shape)
     p = -np.expm1(-times[-1] / particles)
     for r in range(replicas):
         edges = rng.binomial(particles * (particles - 1) // 2, p)
@@ -163,7 +192,7 @@ def random_graph(particles, times, replicas, seed=1):
             i, j = ends[:, clock <= t]
             graph = coo_matrix((np.ones(len(i)), (i, j)), (particles, particles))
             sizes = np.bincount(connected_components(graph, directed=False)[1]).astype(float)
-            moment[r, k] = [np.sum(sizes**q) / particles for q in range(3)]
+            moment[r, k] = [np.sum(sizes**q) / particles for q in range(4)]
             largest[r, k] = sizes.max()
     tracks = ("replica", "time")
     return xr.Dataset(
@@ -174,25 +203,41 @@ def random_graph(particles, times, replicas, seed=1):
             "largest": (tracks, largest),
             "volume": (tracks, np.full(shape, float(particles))),
         },
-        {"time": times, "order": [0.0, 1.0, 2.0]},
+        {"time": times, "order": [0.0, 1.0, 2.0, 3.0]},
     )
 
 
 @pytest.mark.parametrize("times", [9, 41])
 def test_gel_time_and_gel_of_the_multiplicative_kernel(times):
     """Whatever the output times are, one is within two of the errors that are given."""
-    found = analysis.gelation(random_graph(20_000, np.linspace(0, 2, times), 6))
+    ds = random_graph(20_000, np.linspace(0, 2, times), 6)
+    found = analysis.gelation(ds)
     error = found.attrs["gel_time_error"]
     assert found.attrs["gel_time"] == pytest.approx(1.0, abs=2 * error)
     assert found.attrs["gel_time_grid"] == pytest.approx(2 / (times - 1) / np.sqrt(12))
     # N**(-1/3): of the moments of the orders 2 and 3, or of the number of clusters without them
-    assert found.attrs["gel_time_finite"] == pytest.approx(
-        found.attrs["gel_time"] * 20_000 ** (-1 / 3), rel=1e-6
-    )
+    for each in (ds, ds.sel(order=[0, 1, 2])):
+        assert analysis.gelation(each).attrs["gel_time_finite"] == pytest.approx(
+            found.attrs["gel_time"] * 20_000 ** (-1 / 3), rel=1e-6
+        )
     assert error < (0.06 if times == 41 else 0.1)
     share = found["gel_fraction"].mean("replica")
     assert float(share[0]) == 1 / 20_000
     assert float(share[-1]) == pytest.approx(1 - 0.203187869980, abs=0.01)
+    # two and a half times as dense, all comes as much sooner
+    dense = analysis.gelation(denser(ds, 2.5))
+    assert np.allclose(dense["gel_fraction"], found["gel_fraction"], rtol=1e-12)
+    assert np.allclose(dense["gel_time"], found["gel_time"] / 2.5, rtol=1e-12)
+    for name, value in found.attrs.items():
+        assert dense.attrs[name] == pytest.approx(value / 2.5, rel=1e-9)
+
+
+def test_a_peak_between_uneven_times():
+    ds = random_graph(50, np.array([0.0, 0.2, 1.0, 1.5, 3.0]), 1)
+    ds["largest"][:] = 0.0
+    ds["number_density"][:] = 1.0
+    ds["moment"].loc[{"order": 2.0}] = 5 - (ds["time"] - 1.1) ** 2
+    assert float(analysis.gelation(ds)["gel_time"][0]) == pytest.approx(1.1, rel=1e-12)
 
 
 def test_the_end_of_a_finite_system_is_no_gel():
@@ -255,5 +300,10 @@ def test_scaling_of_the_constant_kernel():
     x, phi = found.sel(time=100.0)["x"].values, found.sel(time=100.0)["phi"].values
     assert np.trapezoid(x * phi, x) == pytest.approx(1, abs=0.02)
     assert np.trapezoid(x**2 * phi, x) == pytest.approx(1, abs=0.02)
+    assert np.interp(1.0, x, phi) == pytest.approx(4 * np.exp(-2), rel=0.03)
+    # three times as dense, and the longer the less so: the form is the same
+    mass = 3 / (1 + ds["time"])
+    other = ds.assign({name: mass * ds[name] for name in ("moment", "n", "n_bin")})
+    assert np.allclose(analysis.scaling(other)["phi"], found["phi"], rtol=1e-12, equal_nan=True)
     # at the start only monomers: the rest is left out, not zero
     assert np.isnan(found.sel(time=0.0)["phi"].values[1:]).all()

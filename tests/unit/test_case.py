@@ -1,14 +1,17 @@
 from __future__ import annotations
 
+import inspect
 import tomllib
-from dataclasses import replace
+from dataclasses import MISSING, fields, replace
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import smolux as sx
 from smolux import initial, kernels, processes
 from smolux.case import Case, Output, Run, Solve, load, parse
+from smolux.case.spatial import Flight
 from smolux.errors import InputError
 from smolux.model import Model
 
@@ -149,6 +152,42 @@ def test_times_by_a_table():
     assert parse(text).run.times == (0.1, 1.0, 10.0, 100.0)
     text = GOOD.replace("[1, 10.0]", "{ stop = 1, count = 11 }")
     assert parse(text).run.times == tuple(n / 10 for n in range(11))
+
+
+def defaults(call):
+    """Defaults of the arguments of a function, of those that have one."""
+    found = inspect.signature(call).parameters.values()
+    return {p.name: p.default for p in found if p.default is not p.empty}
+
+
+@pytest.mark.parametrize(
+    ("table", "calls"),
+    [
+        (Run, [sx.simulate]),
+        (Solve, [sx.solve]),
+        (Flight, [sx.spatial.lattice, sx.spatial.random, sx.spatial.simulate]),
+    ],
+)
+def test_a_case_file_has_the_defaults_of_a_call(table, calls):
+    own = {f.name: f.default for f in fields(table) if f.default is not MISSING}
+    for call in calls:
+        shared = (own.keys() & defaults(call).keys()) - {"walls"}
+        assert len(shared) >= 4
+        assert {k: own[k] for k in shared} == {k: defaults(call)[k] for k in shared}
+
+
+def test_what_decides_on_the_data_arrives():
+    apart = {"executor", "progress", "checkpoint", "checkpoint_every", "time_limit"}
+    text = GOOD + 'max_replicas = 40\ntarget = "largest"\nweighting = "weight-function"\n'
+    given = parse(text + "exponent = 0.5\norders = [0, 4]\nsizes = 9\n[solve]\n")
+    arguments = given.run.arguments()
+    assert arguments.keys() == (defaults(sx.simulate).keys() - apart) | {"times"}
+    assert (arguments["max_replicas"], arguments["target"]) == (40, "largest")
+    assert arguments["weighting"] == sx.weighting.WeightFunction(0.5)
+    # the solver observes what the simulation does
+    solved = given.solve_arguments()
+    assert (solved["orders"], solved["sizes"]) == ((0, 4), 9)
+    assert solved.keys() <= inspect.signature(sx.solve).parameters.keys()
 
 
 def test_the_solver_alone_and_beside():

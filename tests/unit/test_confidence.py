@@ -7,10 +7,12 @@ import pytest
 from scipy import stats
 
 import smolux as sx
+from shared import FORMULA
 from smolux.confidence import (
     Sample,
     count_interval,
     enlarged,
+    freedom,
     mean_interval,
     quantile,
     skewed,
@@ -59,9 +61,11 @@ def test_the_interval_of_a_mean_holds_for_skewed_laws(law: str, count: int) -> N
 
 def test_the_third_moment_of_an_additive_kernel() -> None:
     """Groups of 8 of 8000 replicas; one standard deviation of a share is 0.7 %."""
+    kernel = sx.kernels.formula(FORMULA, c0=0.0, c1=1.0, c2=0.0, c3=0.0)
+    model = sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(0.0)])
     ds = sx.simulate(
-        sx.Model(sx.kernels.Additive()), [1.0], method="acceptance-rejection", particles=200,
-        replicas=8000, seed=1, sizes=8, population="fixed-volume",
+        model, [1.0], method="acceptance-rejection", particles=200, replicas=8000, seed=1, sizes=8,
+        population="fixed-volume",
     )  # fmt: skip
     values = ds["moment"].sel(order=3).values[:, 0]
     sample = Sample.of(values.reshape(-1, 8).T)
@@ -70,6 +74,14 @@ def test_the_third_moment_of_an_additive_kernel() -> None:
     held = covered(mean_interval(sample), values.mean())
     doubtful = vague(sample).mean()
     assert held > 0.95 - 4 * 0.007 or (held > 0.9 and doubtful > 0.2)
+
+
+def test_samples_of_a_normal_law_have_no_kurtosis_on_average() -> None:
+    """And their variance follows a chi-square law with one degree of freedom less than samples."""
+    sample = Sample.of(drawn("normal", 8))
+    for known in (sample.skewness, sample.excess):
+        assert abs(known.mean()) < 4 * known.std() / np.sqrt(TRIALS)
+    assert float(freedom(Sample.from_sums(8, *np.array([3.0, 7.0, 0.0, 1.0])))) == pytest.approx(7)
 
 
 def test_a_normal_law_costs_little() -> None:

@@ -25,14 +25,14 @@ def matrix(kernel, m):
 
 
 def sums(kernel, n):
-    """Loss and gain by two plain loops."""
+    """Loss, gain, and gain of the sizes up to twice the last one, by two plain loops."""
     m = len(n)
     values = matrix(kernel, m)
-    gain = np.zeros(m)
+    gain = np.zeros(2 * m)
     for i in range(m):
-        for j in range(m - 1 - i):
+        for j in range(m):
             gain[i + j + 1] += 0.5 * values[i, j] * n[i] * n[j]
-    return values @ n, gain
+    return values @ n, gain[:m], gain[m:]
 
 
 def densities(m, count=3):
@@ -125,9 +125,10 @@ def test_direct_sums(law, m):
     kernel, n = law(), densities(m)
     operator = Direct(kernel, m)
     for row in n:
-        loss, gain = sums(kernel, row)
+        loss, gain, beyond = sums(kernel, row)
         np.testing.assert_allclose(operator.loss(row[None])[0], loss, rtol=1e-12)
         np.testing.assert_allclose(operator.gain(row[None])[0], gain, rtol=1e-11, atol=1e-300)
+        np.testing.assert_allclose(operator.beyond(row), beyond, rtol=1e-11, atol=1e-300)
     operator._cache = None  # the same without a kept matrix
     np.testing.assert_allclose(operator.gain(n)[0], sums(kernel, n[0])[1], rtol=1e-11, atol=1e-300)
 
@@ -138,7 +139,7 @@ def test_low_rank_sums_are_right_far_into_the_tail(law):
     operator = OperatorFactory(kernel, "low-rank", 1e-13)(300)
     assert isinstance(operator, LowRank)
     operator.prepare(n[0])
-    loss, gain = sums(kernel, n[0])
+    loss, gain, _ = sums(kernel, n[0])
     np.testing.assert_allclose(operator.loss(n)[0], loss, rtol=1e-11)
     # densities span nine decades: without the tilt the end of the gain would be noise
     np.testing.assert_allclose(operator.gain(n)[0][1:], gain[1:], rtol=1e-9)

@@ -17,6 +17,7 @@ from smolux.deterministic.terms import Totals
 from smolux.deterministic.timemesh import TimeMesh
 from smolux.deterministic.window import Window
 from smolux.errors import InputError, Interrupted, SmoluxWarning
+from smolux.plan import make_plan
 
 AGGREGATION = sx.processes.Aggregation()
 
@@ -107,6 +108,9 @@ def test_norm_bounds_the_moments():
         relative = abs(error @ sizes**order) / (n @ sizes**order)
         assert relative <= norm(error, n) * (1 + 1e-12)
     assert norm(1e-3 * n, n) == pytest.approx(1e-3)
+    # what is wrong with the largest sizes counts most in the highest moment
+    wrong = n * (sizes > 90)
+    assert norm(wrong, n) == pytest.approx(wrong @ sizes**4 / (n @ sizes**4))
 
 
 def test_window_grows_in_time():
@@ -198,6 +202,24 @@ def test_capped_growth_warns():
         sx.solve(sx.Model(sx.kernels.Additive()), [2.0], max_window=200)
 
 
+def test_what_comes_in_beyond_the_window_is_told():
+    source = sx.processes.Source({3: 0.5, 50: 0.1})
+    model = sx.Model(sx.kernels.Constant(1e-12), [sx.processes.Aggregation(), source])
+    with pytest.warns(SmoluxWarning, match="leave out window"):
+        ds = sx.solve(model, [2.0], window=40)
+    np.testing.assert_allclose(ds["mass_in"], 13.0, rtol=1e-9)
+    np.testing.assert_allclose(ds["moment"].sel(order=1), 4.0, rtol=1e-9)
+    assert json.loads(ds.attrs["mass_beyond"]) == pytest.approx([10 / 14], rel=1e-9)
+
+
+def test_pairs_beyond_the_window_fall_apart_with_all_their_mass():
+    debris = sx.processes.CollisionalFragmentation(1.0, [3, 2, 1])
+    model = sx.Model(sx.kernels.Constant(), [debris], sx.initial.monodisperse(0.1, 12))
+    ds = sx.solve(model, [0.5, 2.0], window=16)
+    np.testing.assert_allclose(ds["moment"].sel(order=1), 1.2, rtol=1e-8)
+    assert np.all(ds["n"].sel(size=[1, 2, 3]) > 0)
+
+
 def test_dataset():
     model = sx.Model(sx.kernels.Constant(), initial=sx.initial.exponential(5.0, density=2.0))
     ds = sx.solve(model, [0.0, 4.0], sizes=16, bins_per_octave=2, orders=(-0.5, 0, 1, 4))
@@ -211,6 +233,10 @@ def test_dataset():
     np.testing.assert_allclose(ds["moment"].sel(order=0), ds["number_density"], rtol=1e-12)
     mass = ds["moment"].sel(order=1)[0] + 10.0 * np.array(json.loads(ds.attrs["mass_beyond"]))
     np.testing.assert_allclose(mass, 10.0, rtol=1e-12)
+    np.testing.assert_allclose(json.loads(ds.attrs["mass_error"]), 0.0, atol=1e-8)
+    # the bins of a simulation, as many as there is something in
+    plan = make_plan(model, [1.0], "inverse", "number", "doubling", 9, 1, 1, (0,), 16, 2, False)
+    np.testing.assert_array_equal(ds["bin_lower"], plan.grid.edges[: ds.sizes["bin"]])
     k = np.arange(1, 17)
     np.testing.assert_allclose(ds["n"][0, 0], 0.4 * 0.8 ** (k - 1), rtol=1e-12)
     # K = 1 keeps the exponential: M0 = 1 / (1 / M0(0) + t / 2)

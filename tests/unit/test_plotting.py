@@ -1,5 +1,6 @@
 """Figures: they are made for every kind of result, show the right numbers and are fit for print."""
 
+import json
 import subprocess
 import sys
 
@@ -13,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 import smolux as sx
 from smolux import plotting
 from smolux.analysis.statistics import Sample, mean_interval
+from smolux.model_dict import model_to_dict
 from smolux.plotting.distribution import Classes
 
 TIMES = np.concatenate([[0.0], np.geomspace(0.1, 50, 9)])
@@ -151,6 +153,8 @@ def test_moments_show_means_and_their_intervals(many):
     assert np.array_equal(x, TIMES[1:])
     assert np.allclose(y, mean[1:])
     assert np.allclose(half, (upper - lower)[1:] / 2)
+    ends = [s[:, 1] for s in ax.containers[0][2][0].get_segments()]
+    assert np.allclose(ends, np.stack([lower, upper], axis=1)[1:])
     (line,) = [line for line in ax.lines if line.get_linestyle() == "-"]
     assert np.allclose(line.get_ydata(), 1 + line.get_xdata())
 
@@ -226,9 +230,12 @@ def test_comparison_measures_by_the_solver(many, solved):
     figure = plotting.comparison({"a": many, "solver": solved, "b": many})
     both = bars(figure.axes[1])
     assert len(both) == 2
-    known = 100 * (many["number_density"].mean("replica").values / (2 / (TIMES + 2)) - 1)
-    for x, y, _ in both:
+    percent = 100 * (TIMES + 2) / 2
+    known = percent * many["number_density"].mean("replica").values - 100
+    lower, upper = mean_interval(Sample.of(many["number_density"].values))
+    for x, y, half in both:
         assert np.allclose(y, known[1:])
+        assert np.allclose(half, (percent * (upper - lower) / 2)[1:])
         assert np.allclose(x, TIMES[1:], rtol=0.05)
     # side by side
     assert np.all(both[0][0] < both[1][0])
@@ -242,6 +249,31 @@ def test_labels_have_units():
     ax = plotting.moments(ds).axes[0]
     assert ax.get_xlabel() == "time $t$ (s)"
     assert ax.get_ylabel() == "moment $M_p$ (m$^{-3}$)"
+
+
+def test_the_scaled_form_does_not_depend_on_the_mass(solved):
+    mass = 3 / (1 + solved["time"])
+    names = ("number_density", "moment", "n", "n_bin")
+    other = solved.assign({name: mass * solved[name] for name in names})
+    both = [plotting.scaling(ds).axes[0].lines for ds in (solved, other)]
+    assert len(both[0]) == 4
+    for one, two in zip(*both, strict=True):
+        np.testing.assert_allclose(one.get_xydata(), two.get_xydata(), rtol=1e-12, atol=1e-300)
+
+
+def test_the_exact_mass_of_rate_equations_is_without_the_gel(solved):
+    model = sx.Model(sx.kernels.Multiplicative())
+    ds = solved.assign_attrs(model=json.dumps(model_to_dict(model)), gel="inert")
+    exact = plotting.moments(ds, orders=(1,)).axes[0].lines[0]
+    assert len(exact.get_xdata()) > 100
+    np.testing.assert_allclose(exact.get_ydata(), np.minimum(1.0, 1.0 / exact.get_xdata()))
+
+
+def test_the_cycle_of_an_oscillation_begins_at_the_start_that_is_given(many):
+    _, cycle = plotting.oscillations(many, start=1.0).axes
+    late = many.isel(replica=0, time=TIMES >= 1.0)
+    np.testing.assert_array_equal(cycle.lines[0].get_xdata(), late["number_density"])
+    np.testing.assert_array_equal(cycle.lines[0].get_ydata(), late["moment"].sel(order=2))
 
 
 def test_own_axes(many):

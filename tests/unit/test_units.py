@@ -25,6 +25,7 @@ from smolux.errors import InputError
         ("1e-9 cm^3/s", units.KERNEL, 1e-15),
         ("1.8e-5 Pa s", units.VISCOSITY, 1.8e-5),
         ("1.2 g/cm^3", units.MASS_DENSITY, 1200.0),
+        ("1.234567890123 cm", units.LENGTH, 0.01234567890123),
     ],
 )
 def test_quantities_become_si(text, dimension, value):

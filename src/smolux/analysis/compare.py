@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import optimize, stats
 
 from smolux.errors import InputError
 from smolux.results import require
@@ -30,7 +30,7 @@ STATISTICS = ("first", "second", "difference", "relative", "error", "sigmas")
 #: particles of one size or bin that a density must rest on, for the normal law to hold
 _ENOUGH = 10.0
 #: standard errors that one number must differ by to be found, beyond which replicas are too few
-_BLUNT = 10.0
+_BLUNT = 12.0
 #: chance of finding what `found_beyond` says
 _POWER = 0.9
 #: the words for `agree`
@@ -47,7 +47,7 @@ _TESTED = (
     "1958), careful. p_largest: the largest of sigmas by Bonferroni, which holds for any "
     "correlation. The results differ if p_value is below 0.005, p_total below 0.001 or p_largest "
     "below 0.004; equal ones do so in about 1 of 100 cases. If not, they agree, unless a single "
-    "number had to be off by more than 10 standard errors to be found (found_beyond, with a chance "
+    "number had to be off by more than 12 standard errors to be found (found_beyond, with a chance "
     "of 90 %): then there are too few replicas to tell. A bias of order 1/N of a finite population "
     "is a difference too."
 )
@@ -351,5 +351,9 @@ def _found_beyond(freedom: int) -> float:
     """Return the standard errors that one number must be off by, to be found nearly always."""
     if not freedom:
         return np.nan
-    level = SIGNIFICANCE * _SHARES["p_largest"]
-    return float(stats.t.isf(level / 2, freedom) + stats.norm.ppf(_POWER))
+    quantile = float(stats.t.isf(SIGNIFICANCE * _SHARES["p_largest"] / 2, freedom))
+
+    def missed(shift: float) -> float:
+        return float(stats.nct.cdf(quantile, freedom, shift)) - (1.0 - _POWER)
+
+    return float(optimize.brentq(missed, quantile, 2.0 * quantile))
