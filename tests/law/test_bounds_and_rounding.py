@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import smolux as sx
+from shared import Low, repaired
 from smolux.kernels.formula_kernel import FormulaKernel
 
 
@@ -36,17 +37,7 @@ def test_a_bound_one_unit_too_low_is_no_broken_bound(method: str) -> None:
     laws.agree(ds["particles"].values[:, 0], exact, method)
 
 
-class Low(FormulaKernel):
-    """The constant law, its bounds an eighth of it."""
-
-    rigorous = False
-
-    def bounds(self, a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any]:
-        shape = np.broadcast(a, b, c, d).shape
-        return np.zeros(shape), np.full(shape, 0.125)
-
-
-@pytest.mark.filterwarnings("default:the kernel was found above:smolux.errors.SmoluxWarning")
+@repaired
 @pytest.mark.parametrize("method", [m.name for m in sx.methods.METHODS if m.name != "inverse"])
 def test_events_that_are_missed_are_estimated(method: str) -> None:
     """Until the first candidate an eighth of the events take place."""
@@ -69,3 +60,18 @@ def test_events_that_are_missed_are_estimated(method: str) -> None:
     # what is missing leaves more particles for later, less than 2 * 4.4 / 500 of eight events
     error = np.sqrt((sum(events) + 49.0 * 0.63) / replicas)
     assert abs(events[0] - events[1] - missed) < 4.5 * error + 0.14 + 0.05
+
+
+@repaired
+@pytest.mark.parametrize("method", [m.name for m in sx.methods.METHODS if m.name != "inverse"])
+def test_what_follows_a_repair_is_right(method: str) -> None:
+    """A few events are missed at the start, none of the thousands in doubled volumes after it."""
+    known, density, end = laws.kernel("constant"), 2.5, 1.6
+    processes = [sx.processes.Aggregation(), sx.processes.Shattering(0.0)]
+    start = sx.initial.monodisperse(density, size=100)
+    ds = sx.simulate(
+        sx.Model(Low(known.expression, known.names, known.values), processes, start), [end],
+        method=method, particles=4000, replicas=16, bins_per_octave=1, sizes=1, seed=6,
+    )  # fmt: skip
+    assert (ds["volume"] > 4000 / density).all()
+    laws.agree(ds["number_density"].values[:, 0], density / (1.0 + 0.5 * density * end), method)
