@@ -9,9 +9,10 @@ from typing import Any
 import laws
 import numpy as np
 import pytest
+from scipy import stats
 
 import smolux as sx
-from shared import Low, repaired
+from shared import Low, extinction, repaired
 from smolux.kernels.formula_kernel import FormulaKernel
 
 
@@ -75,3 +76,20 @@ def test_what_follows_a_repair_is_right(method: str) -> None:
     )  # fmt: skip
     assert (ds["volume"] > 4000 / density).all()
     laws.agree(ds["number_density"].values[:, 0], density / (1.0 + 0.5 * density * end), method)
+
+
+@repaired
+@extinction
+@pytest.mark.parametrize("method", ["acceptance-rejection", "low-rank", "fictitious-jumps"])
+def test_the_next_event_after_a_repair_has_its_rate(method: str) -> None:
+    """Three merge at an eighth of 3/V, when that is found out, and two then at 1/V."""
+    known, volume = laws.kernel("constant"), 3 / 2.5
+    processes = [sx.processes.Aggregation(), sx.processes.Shattering(0.0)]
+    kernel = Low(known.expression, known.names, known.values)
+    ds = sx.simulate(
+        sx.Model(kernel, processes, sx.initial.monodisperse(2.5)), [1e6], method=method,
+        population="fixed-volume", particles=3, replicas=4000, bins_per_octave=1, sizes=1, seed=7,
+    )  # fmt: skip
+    clock = ds["extinction_time"] / volume
+    found = stats.kstest(clock, lambda t: 1.0 - (np.exp(-0.375 * t) - 0.375 * np.exp(-t)) / 0.625)
+    assert found.pvalue > laws.RARE

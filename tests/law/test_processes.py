@@ -77,7 +77,7 @@ CASES = {
     "source": {"source": 1.0, "initial": sx.initial.empty()},
     "source and sink": {"source": 1.0, "above": 20, "initial": sx.initial.empty()},
     "collisional fragmentation": {"disruption": 0.8},
-    "source and doubling": {"source": 0.05, "removal": 0.2},
+    "source-and-doubling": {"source": 0.05, "removal": 0.2},
     "all": {
         "evaporation": 0.5, "fragmentation": 0.2, "removal": 0.1, "above": 50, "source": 1.0,
         "disruption": 0.1,
@@ -184,7 +184,7 @@ def test_rates_that_depend_on_the_size(method: str, case: str) -> None:
     given, second = BY_SIZE[case]
     model = everything(**given)
     truth = sx.solve(model, [1.0, 4.0])
-    assert float(truth["moment"].sel(order=2, time=4.0)) == pytest.approx(second, abs=5e-4)
+    assert truth["moment"].sel(order=2, time=4.0).item() == pytest.approx(second, abs=5e-4)
     agree(simulated(model, [1.0, 4.0], 71, method=method), truth, case)
 
 
@@ -232,20 +232,22 @@ def test_three_particles_that_leave() -> None:
 
 
 def test_a_size_at_the_limit_stays() -> None:
-    """Of three monomers two merge at the rate 1 and stay; all leave as one, at the rate 1/3."""
+    """Four monomers merge at 6/V, 3/V and 1/V; a three among them stays, and the four leaves."""
     ds = simulated(
-        everything(above=2), [1.0, 80.0], 74, particles=3, replicas=4000,
+        everything(above=3), [1.0, 80.0], 74, particles=4, replicas=4000,
         population="fixed-volume",
     )  # fmt: skip
-    gone = 1.0 - 1.5 * np.exp(-1 / 3) + 0.5 * np.exp(-1.0)
-    laws.agree(ds["mass_out"].values[:, 0], 3.0 * gone)
-    assert (ds["mass_out"].values[:, 1] == 3.0).all()
+    rates = np.array([6.0, 3.0, 1.0]) / 4.0
+    others = rates[:, None] / (rates[:, None] - rates + np.diag(rates))
+    gone = 1.0 - np.exp(-rates) @ others.prod(axis=0)
+    laws.agree(ds["mass_out"].values[:, 0], 4.0 * gone)
+    assert (ds["mass_out"].values[:, 1] == 4.0).all()
     assert (ds["particles"].values[:, 1] == 0).all()
 
 
 def test_sub_volumes_keep_the_balance() -> None:
     """With doublings, and what comes and goes."""
-    case = "source and doubling"
+    case = "source-and-doubling"
     model, truth = everything(**CASES[case]), solved(case)
     ds = simulated(model, TIMES, 75, particles=4000, replicas=8, subvolumes=2, remix=0.3)
     assert (ds["volume"].values[:, 1] > 4000.0).all()

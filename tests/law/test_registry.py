@@ -99,9 +99,8 @@ def test_time_until_three_merge(method: str) -> None:
 @pytest.mark.parametrize("method", QUICK)
 def test_two_monomers_do_not_mind_encounters_that_come_to_nothing(method: str) -> None:
     """They shatter into themselves, at a rate that varies and is thinned: the mean is 2 still."""
-    ds = laws.finite(
-        "constant", [1e6], method, VARYING, particles=2, replicas=4000, sizes=1, seed=63
-    )
+    model = laws.model("constant", VARYING)
+    ds = fixed(model, 1e6, method, 2, replicas=4000, sizes=1, seed=63)
     assert stats.kstest(ds["extinction_time"], stats.expon(scale=2.0).cdf).pvalue > laws.RARE
 
 
@@ -150,13 +149,13 @@ def test_forty_particles(method: str) -> None:
 
 @lru_cache
 def solved() -> Any:
-    return sx.solve(laws.model("ballistic", 0.1, start(3, 3, 3, 7, 7)), [0.05, 1.0], sizes=300)
+    return sx.solve(laws.model("ballistic", 0.01, start(3, 3, 3, 7, 7)), [0.05, 1.0], sizes=300)
 
 
 @every_method
 def test_means(method: str) -> None:
     """Moments and densities against the rate equations, with doubling."""
-    model, truth = laws.model("ballistic", 0.1, start(3, 3, 3, 7, 7)), solved()
+    model, truth = laws.model("ballistic", 0.01, start(3, 3, 3, 7, 7)), solved()
     times = truth["time"].values
     ds = sx.simulate(model, times, method=method, particles=1000, replicas=24, seed=67, sizes=32)
     assert (ds["volume"].isel(time=-1) > 400.0).all()
@@ -166,6 +165,20 @@ def test_means(method: str) -> None:
     for size in (1, 3, 7, 10):
         expected = truth["n"].sel(size=size).values[0]
         laws.agree(ds["n"].sel(size=size).values, expected, size)
+
+
+@pytest.mark.parametrize("method", QUICK)
+def test_events_at_a_rate_that_varies(method: str) -> None:
+    """Late, when windows of time are longer than a period: a fifth of the encounters is thinned."""
+    model = laws.model("constant", VARYING, start(3, 3, 3, 7, 7))
+    truth = sx.solve(model, [12.0])
+    ds = sx.simulate(
+        model, [12.0], method=method, particles=1000, replicas=16, seed=70, sizes=1,
+        population="fixed-volume", bins_per_octave=1,
+    )  # fmt: skip
+    laws.agree(ds["number_density"].values, truth["number_density"].values[0])
+    events = ds["events"].values[:, 0] / ds["volume"].values
+    laws.agree(events, truth["events"].values[0, 0], "events")
 
 
 @every_method

@@ -139,7 +139,7 @@ def test_fluctuations_are_those_of_the_whole(monkeypatch: pytest.MonkeyPatch) ->
 
     Mean and variance after two mixings for each particle that is left.
     """
-    particles, replicas, end = 400, 120, 2.0
+    particles, replicas, end = 400, 60, 2.0
     for module in (plan, subvolumes):
         monkeypatch.setattr(module, "LEAST", 4)
     ds = sx.simulate(
@@ -150,8 +150,8 @@ def test_fluctuations_are_those_of_the_whole(monkeypatch: pytest.MonkeyPatch) ->
     number = ds["particles"].values[:, 0]
     mean, variance = finite.law("constant", particles).number_moments(end)
     assert abs(number.mean() - mean) < 4.5 * np.sqrt(variance / replicas)
-    # 120 values: their variance is within 4.5 standard errors of 13 %
-    assert abs(number.var(ddof=1) / variance - 1.0) < 0.58
+    # sixty values: their variance is within 4.5 standard errors of 18 %
+    assert abs(number.var(ddof=1) / variance - 1.0) < 0.83
 
 
 @pytest.mark.slow
