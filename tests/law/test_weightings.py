@@ -202,7 +202,7 @@ def test_bias_of_the_second_moment(q: float, particles: int) -> None:
     weighting = MASS_FLOW if q == 1.0 else power(q)
     ds = sx.simulate(
         model("constant"), [20.0], method="acceptance-rejection", weighting=weighting,
-        population="fixed-volume", particles=particles, replicas=2000, seed=35, orders=(2,),
+        population="fixed-volume", particles=particles, replicas=1000, seed=35, orders=(2,),
         sizes=8,
     )  # fmt: skip
     laws.agree(ds["moment"].sel(order=2).values, mean)
