@@ -262,6 +262,10 @@ def test_short_forms_are_the_definition(weighting: Any) -> None:
     corners = [rates.arrays(a, b) for a in (i, 2.0 * i) for b in (j, 2.0 * j)]
     np.testing.assert_allclose(lower, np.min(corners, axis=0), rtol=1e-12)
     np.testing.assert_allclose(upper, np.max(corners, axis=0), rtol=1e-12)
+    assert rates.majorant is not None
+    share = rates.arrays(i, j) / rates.majorant(i, j)
+    assert share.max() <= 1 + 1e-12
+    assert share.min() >= rates.majorant.least * (1 - 1e-12)
 
 
 def test_a_weight_that_falls() -> None:
