@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 import pytest
+
+from smolux.kernels.formula_kernel import FormulaKernel
 
 #: kernel of the tests of laws and of runs: 1, i + j, i j and the ballistic one by its coefficients
 FORMULA = "c0 + c1*(i + j) + c2*i*j + c3*(cbrt(i) + cbrt(j))**2*sqrt(1/i + 1/j)"
@@ -30,3 +35,17 @@ laborious = pytest.mark.filterwarnings("default:.*fewer than 1 in 1000:smolux.er
 extinction = pytest.mark.filterwarnings(
     "default:.*ended as one cluster:smolux.errors.SmoluxWarning"
 )
+#: for tests of bounds that are broken on purpose
+repaired = pytest.mark.filterwarnings(
+    "default:the kernel was found above:smolux.errors.SmoluxWarning"
+)
+
+
+class Low(FormulaKernel):
+    """The constant law by the formula of the tests, its bounds an eighth of it."""
+
+    rigorous = False
+
+    def bounds(self, a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any]:
+        shape = np.broadcast(a, b, c, d).shape
+        return np.zeros(shape), np.full(shape, 0.125)

@@ -130,7 +130,7 @@ def generator(law: Kernel, particles: int, shattering: float) -> Float:
 
 def whole_distribution(method: Any, law: str, shattering: float, seed: int = 1) -> None:
     """All partitions of eight monomers against the master equation of the Markov chain."""
-    particles, replicas, times = 8, 10_000, (0.5, 1.5)
+    particles, replicas, times = 8, 6000, (0.5, 1.5)
     ds = finite(
         law, times, method, shattering, particles=particles, replicas=replicas, sizes=8, seed=seed
     )
@@ -199,7 +199,7 @@ def waiting_times(method: Any, seed: int = 3) -> None:
     Two merge at the rate 1/V, V = 2. Three merge at 3/V and then 1/V, V = 3. That two monomers
     may shatter, too, changes nothing.
     """
-    settings = {"replicas": 8000, "sizes": 8}
+    settings = {"replicas": 4000, "sizes": 8}
     for shattering in (0.0, 0.5):
         two = finite(
             "constant", [1e6], method, shattering, particles=2, seed=seed, **settings

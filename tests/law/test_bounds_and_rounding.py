@@ -9,8 +9,10 @@ from typing import Any
 import laws
 import numpy as np
 import pytest
+from scipy import stats
 
 import smolux as sx
+from shared import Low, extinction, repaired
 from smolux.kernels.formula_kernel import FormulaKernel
 
 
@@ -36,17 +38,7 @@ def test_a_bound_one_unit_too_low_is_no_broken_bound(method: str) -> None:
     laws.agree(ds["particles"].values[:, 0], exact, method)
 
 
-class Low(FormulaKernel):
-    """The constant law, its bounds an eighth of it."""
-
-    rigorous = False
-
-    def bounds(self, a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any]:
-        shape = np.broadcast(a, b, c, d).shape
-        return np.zeros(shape), np.full(shape, 0.125)
-
-
-@pytest.mark.filterwarnings("default:the kernel was found above:smolux.errors.SmoluxWarning")
+@repaired
 @pytest.mark.parametrize("method", [m.name for m in sx.methods.METHODS if m.name != "inverse"])
 def test_events_that_are_missed_are_estimated(method: str) -> None:
     """Until the first candidate an eighth of the events take place."""
@@ -69,3 +61,35 @@ def test_events_that_are_missed_are_estimated(method: str) -> None:
     # what is missing leaves more particles for later, less than 2 * 4.4 / 500 of eight events
     error = np.sqrt((sum(events) + 49.0 * 0.63) / replicas)
     assert abs(events[0] - events[1] - missed) < 4.5 * error + 0.14 + 0.05
+
+
+@repaired
+@pytest.mark.parametrize("method", [m.name for m in sx.methods.METHODS if m.name != "inverse"])
+def test_what_follows_a_repair_is_right(method: str) -> None:
+    """A few events are missed at the start, none of the thousands in doubled volumes after it."""
+    known, density, end = laws.kernel("constant"), 2.5, 1.6
+    processes = [sx.processes.Aggregation(), sx.processes.Shattering(0.0)]
+    start = sx.initial.monodisperse(density, size=100)
+    ds = sx.simulate(
+        sx.Model(Low(known.expression, known.names, known.values), processes, start), [end],
+        method=method, particles=4000, replicas=16, bins_per_octave=1, sizes=1, seed=6,
+    )  # fmt: skip
+    assert (ds["volume"] > 4000 / density).all()
+    laws.agree(ds["number_density"].values[:, 0], density / (1.0 + 0.5 * density * end), method)
+
+
+@repaired
+@extinction
+@pytest.mark.parametrize("method", ["acceptance-rejection", "low-rank", "fictitious-jumps"])
+def test_the_next_event_after_a_repair_has_its_rate(method: str) -> None:
+    """Three merge at an eighth of 3/V, when that is found out, and two then at 1/V."""
+    known, volume = laws.kernel("constant"), 3 / 2.5
+    processes = [sx.processes.Aggregation(), sx.processes.Shattering(0.0)]
+    kernel = Low(known.expression, known.names, known.values)
+    ds = sx.simulate(
+        sx.Model(kernel, processes, sx.initial.monodisperse(2.5)), [1e6], method=method,
+        population="fixed-volume", particles=3, replicas=4000, bins_per_octave=1, sizes=1, seed=7,
+    )  # fmt: skip
+    clock = ds["extinction_time"] / volume
+    found = stats.kstest(clock, lambda t: 1.0 - (np.exp(-0.375 * t) - 0.375 * np.exp(-t)) / 0.625)
+    assert found.pvalue > laws.RARE

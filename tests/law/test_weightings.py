@@ -202,7 +202,7 @@ def test_bias_of_the_second_moment(q: float, particles: int) -> None:
     weighting = MASS_FLOW if q == 1.0 else power(q)
     ds = sx.simulate(
         model("constant"), [20.0], method="acceptance-rejection", weighting=weighting,
-        population="fixed-volume", particles=particles, replicas=2000, seed=35, orders=(2,),
+        population="fixed-volume", particles=particles, replicas=1000, seed=35, orders=(2,),
         sizes=8,
     )  # fmt: skip
     laws.agree(ds["moment"].sel(order=2).values, mean)
@@ -222,7 +222,7 @@ def smooth(size: float) -> float:
     return 2.0 + size**0.3
 
 
-WEIGHTS = [0.5, 1.0, 1.25, -0.5, "1 + l/100", smooth, bent]
+WEIGHTS = [0.5, 1.0, 1.25, -0.5, "1 + l/100", "1/(1 + l)", smooth, bent]
 
 
 @pytest.mark.parametrize("weight", WEIGHTS, ids=lambda w: getattr(w, "__name__", str(w)))
@@ -247,6 +247,37 @@ def test_bounds_and_majorants(weight: Any) -> None:
             share = exact / rates.majorant(i, j)
             assert share.max() <= 1 + 1e-12
             assert share.min() >= rates.majorant.least * (1 - 1e-12)
+
+
+@pytest.mark.parametrize("weighting", sx.weighting.WEIGHTINGS, ids=lambda kind: kind.name)
+def test_short_forms_are_the_definition(weighting: Any) -> None:
+    """What each weighting says of its rate and bounds is what its weight says."""
+    made = weighting()
+    i, j = np.array([1.0, 3.0, 7.0, 250.0])[:, None], np.array([1.0, 2.0, 31.0, 4000.0])
+    one, two, both = made.weights(i), made.weights(j), made.weights(i + j)
+    exact = np.maximum(np.maximum(one, two), both) / (one * two)
+    rates = rates_for(sx.Model(sx.kernels.Constant(3.0)), made)
+    np.testing.assert_allclose(rates.arrays(i, j), 3.0 * exact, rtol=1e-13)
+    lower, upper = rates.bounds(i, 2.0 * i, j, 2.0 * j)
+    corners = [rates.arrays(a, b) for a in (i, 2.0 * i) for b in (j, 2.0 * j)]
+    np.testing.assert_allclose(lower, np.min(corners, axis=0), rtol=1e-12)
+    np.testing.assert_allclose(upper, np.max(corners, axis=0), rtol=1e-12)
+    assert rates.majorant is not None
+    share = rates.arrays(i, j) / rates.majorant(i, j)
+    assert share.max() <= 1 + 1e-12
+    assert share.min() >= rates.majorant.least * (1 - 1e-12)
+
+
+def test_a_weight_that_falls() -> None:
+    """From sizes that weigh next to nothing, and less when they have merged: 1/(1 + t/2)."""
+    start = sx.initial.monodisperse(size=3000)
+    ds = sx.simulate(
+        laws.model("constant", initial=start), [5.0], method="acceptance-rejection",
+        weighting=sx.weighting.WeightFunction("1/(1 + l)"), particles=1000, replicas=32, seed=37,
+        sizes=1, bins_per_octave=1,
+    )  # fmt: skip
+    laws.agree(ds["number_density"].values[:, 0], 2.0 / 7.0)
+    laws.agree(ds["moment"].sel(order=1).values, 3000.0)
 
 
 @pytest.mark.slow

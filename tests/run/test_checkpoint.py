@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickletools
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,40 @@ def test_stopped_again_and_again(method: str, distribution: bool, path: Path) ->
     np.testing.assert_array_equal(
         part["collisions"].values[reached], ds["collisions"].values[reached]
     )
+
+
+@shared.repaired
+def test_a_raised_bound_is_kept(path: Path) -> None:
+    """All replicas find their bound broken before the run is first stopped."""
+    model = runs.model(0.1, c1=0.0)
+    law = model.kernel
+    low = replace(model, kernel=shared.Low(law.expression, law.names, law.values))
+    given: dict[str, Any] = {"method": "acceptance-rejection"} | SETTINGS
+    expected = sx.simulate(low, TIMES, **given)
+    part = sx.simulate(low, TIMES, checkpoint=path, time_limit=1e-9, **given)
+    assert not part.attrs["complete"]
+    ds, _ = go_on(path, model=low)
+    runs.assert_same(expected, ds)
+    assert "above its bound 3 times" in ds.attrs["warnings"]
+    assert sx.results.warnings(ds) == sx.results.warnings(expected)
+
+
+@shared.extinction
+def test_replicas_that_have_ended_stay_so(path: Path) -> None:
+    """Some have merged to one cluster when the run is stopped, and some have not."""
+    given: dict[str, Any] = {
+        "method": "acceptance-rejection", "particles": 20, "replicas": 2000, "seed": 5,
+        "population": "fixed-volume", "sizes": 20,
+    }  # fmt: skip
+    model, times = runs.model(0.0), [500.0]
+    expected = sx.simulate(model, times, **given)
+    part = sx.simulate(model, times, checkpoint=path, time_limit=1e-9, **given)
+    while not np.isfinite(part["extinction_time"]).any():
+        part = sx.resume(path, time_limit=1e-9)
+    assert np.isnan(part["extinction_time"]).any()
+    ds, _ = go_on(path)
+    runs.assert_same(expected, ds)
+    assert np.isfinite(ds["extinction_time"]).all()
 
 
 def test_interrupted_from_the_keyboard(path: Path) -> None:

@@ -134,6 +134,26 @@ def test_mixing_takes_the_bias_away(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 0.6 < mixed.var() / variance < 1.6
 
 
+def test_fluctuations_are_those_of_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Variance of the number of clusters of many particles; in parts that agree it would be more.
+
+    Mean and variance after two mixings for each particle that is left.
+    """
+    particles, replicas, end = 400, 60, 2.0
+    for module in (plan, subvolumes):
+        monkeypatch.setattr(module, "LEAST", 4)
+    ds = sx.simulate(
+        runs.model(0.0, sx.initial.monodisperse(), c1=0.0), [end], method="acceptance-rejection",
+        particles=particles, seed=2, replicas=replicas, population="fixed-volume", subvolumes=4,
+        remix=0.3, sizes=1, bins_per_octave=1,
+    )  # fmt: skip
+    number = ds["particles"].values[:, 0]
+    mean, variance = finite.law("constant", particles).number_moments(end)
+    assert abs(number.mean() - mean) < 4.5 * np.sqrt(variance / replicas)
+    # sixty values: their variance is within 4.5 standard errors of 18 %
+    assert abs(number.var(ddof=1) / variance - 1.0) < 0.83
+
+
 @pytest.mark.slow
 def test_a_kernel_above_its_bound_is_remembered() -> None:
     def ridge(i: float, j: float) -> float:  # where sizes differ by 37, which it does not name
