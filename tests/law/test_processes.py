@@ -272,6 +272,7 @@ def test_source_and_sink_oscillate() -> None:
         (lambda: P.Evaporation(-1.0), "the evaporation rate = -1.0: is -1 for the size 1"),
         (lambda: P.Evaporation("q"), "unknown name 'q'"),
         (lambda: P.Evaporation([]), "must be a number, a formula in k"),
+        (lambda: P.Evaporation([0.0, 1.0, -2.0]), "is -2 for the size 3"),
         (lambda: P.Evaporation.free_molecular(-1.0, np.nan), "steepness = nan"),
         (lambda: P.Fragmentation(0.0), "a finite number above zero"),
         (lambda: P.Fragmentation("i - j"), "the fragmentation rate"),

@@ -54,6 +54,7 @@ def twice(a: float, b: float, height: float) -> tuple[float, float]:
         (TimeFunction.of("1 + t**2"), (3.0,)),
         (TimeFunction.of(measured), (7.015,)),
         (SizeFunction.of([1.0, 4.0, 2.0], "rate"), (2.0,)),
+        (SizeFunction.of([1.0, 4.0, 2.0], "rate"), (7.0,)),
         (SizeFunction.of("sqrt(k)", "rate"), (9.0,)),
         (formula("a*(i + j)", a=0.5).law, (1.0, 3.0)),
         (from_function(lambda i, j, a=2.0: a * i * j, a=3.0).law, (1.0, 3.0)),

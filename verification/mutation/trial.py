@@ -19,7 +19,7 @@ _COPIED = ("src", "tests", "verification", "benchmarks", "docs", "examples")
 _LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc", "*.egg-info", "*.png")
 #: no tests of one mistake should take longer, with compilation
 PATIENCE = 600.0
-_FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+?)(?: - .*)?$", re.MULTILINE)
+_FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 
 
 class BrokenTrialError(Exception):
