@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import runs
+from scipy import stats
 
 import smolux as sx
 from shared import QUICK, extinction
-from smolux import assembly
-from smolux.core.state import REPAIRS
+from smolux import assembly, files
+from smolux.core.state import BY_FACTOR, BY_KERNEL, EVENTS, EXTINCT, REPAIRS, TIME
 from smolux.errors import InputError, SmoluxWarning
 from smolux.replicas import Group
 from smolux.timefunction import TimeFunction
@@ -243,3 +245,90 @@ def test_a_rate_that_is_seen_to_turn_negative() -> None:
     with pytest.raises(InputError, match=r"is -0\.\d+ at t = 0\.\d+") as caught:
         sx.simulate(runs.model("0.1 - t"), [0.2, 0.5], method=runs.METHODS[0])
     assert "shattering" in str(caught.value)
+
+
+# --- what was raised stays raised, when a run goes on ---------------------------------------------
+
+
+def half(a: float, b: float, *rest: float) -> tuple[float, float]:
+    """Bounds that hold for all sizes together, but not for the small ones."""
+    return 0.0, 1.0 if b > 1000 else 0.5
+
+
+def in_pieces(group: Group, path: Path, look: Any) -> Group:
+    """Advance event by event, written and read again after each; `look` at it in between."""
+    while not group.done:
+        group._call(group.codes, 1)
+        group._serve()
+        look(group)
+        group = runs.written(group, path)
+    return group
+
+
+def assert_same_end(one: Group, other: Group) -> None:
+    for kind in ("state", "tally"):
+        for name, values in getattr(one, kind)._asdict().items():
+            np.testing.assert_array_equal(values, getattr(getattr(other, kind), name), name)
+
+
+def test_a_raised_bound_of_the_kernel_lasts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four particles, K = 1, stated to be at most one half until the first candidate raises it.
+
+    Then three are left in the volume four, and merge at the rates 3/4 and 1/4 whatever was stated.
+    """
+    monkeypatch.setattr(files, "_sync", lambda *_: None)  # nothing here is to last
+    plan = runs.plan(
+        model(1.0, half), [4.0, 1e6], "acceptance-rejection", population="none", particles=4,
+        sizes=4, replicas=1000, bins_per_octave=1,
+    )  # fmt: skip
+    whole = Group.start(plan, 0, plan.replicas)
+    whole.advance(lambda: False)
+    first = np.full(plan.replicas, np.nan)
+
+    def look(group: Group) -> None:
+        one = group.state.count[:, EVENTS] == 1
+        first[one] = group.state.clock[one, TIME]
+
+    group = in_pieces(Group.start(plan, 0, plan.replicas), tmp_path / "run.npz", look)
+    assert_same_end(whole, group)
+    rest = (group.state.clock[:, EXTINCT] - first) / 4.0
+    law = stats.kstest(rest, lambda t: 1 - 1.5 * np.exp(-t) + 0.5 * np.exp(-3 * t))
+    assert law.pvalue > 1e-4
+    assert (group.tally.counts[:, 1] == [0, 0, 0, 0, 1]).all()  # output after the extinction
+    # every pair was missed as often as it was met, until one was
+    np.testing.assert_allclose(group.state.missed[:, BY_KERNEL], 1.0)
+
+
+def test_a_raised_bound_of_a_factor_lasts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dimers that merge or shatter, both at the rate one, of which one half is stated.
+
+    From the first that shatters on, as many shatter as merge.
+    """
+    monkeypatch.setattr(files, "_sync", lambda *_: None)
+    stated = replace(rate(1.0, 0.0), stated=(0.0, 0.5))
+    processes = [sx.processes.Aggregation(), sx.processes.Shattering(stated)]
+    dimers = sx.initial.monodisperse(size=2)
+    physics = sx.Model(sx.kernels.from_function(odd, bounds=one), processes, dimers)
+    plan = runs.plan(
+        physics, [1.0], "acceptance-rejection", population="none", particles=6, sizes=4,
+        replicas=400, bins_per_octave=1,
+    )  # fmt: skip
+    whole = Group.start(plan, 0, plan.replicas)
+    whole.advance(lambda: False)
+    before = np.zeros((plan.replicas, 2), int)
+
+    def look(group: Group) -> None:
+        none = before[:, 1] == 0
+        before[none] = group.state.events[none]
+
+    group = in_pieces(Group.start(plan, 0, plan.replicas), tmp_path / "run.npz", look)
+    assert_same_end(whole, group)
+    raised = before[:, 1] == 1
+    merged, shattered = (group.state.events - before)[raised].T
+    excess = merged - shattered
+    assert raised.sum() > 300
+    assert abs(excess.mean()) < 4.5 * excess.std() / np.sqrt(len(excess))
+    # for the one that shattered by the bound one did not
+    np.testing.assert_allclose(group.state.missed[raised, BY_FACTOR + 1], 1.0)
