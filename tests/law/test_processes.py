@@ -177,7 +177,8 @@ def test_particles_collide_leave_or_stay() -> None:
     """With the density 2.5: ``M0 = 2.5 q / (1 + 2.5 (1 - q) / 2 r)``, ``q = exp(-r t)``."""
     rate, density = 0.3, 2.5
     model = everything(removal=rate, initial=sx.initial.monodisperse(density))
-    ds, truth = simulated(model, TIMES, 44, population="fixed-volume"), sx.solve(model, TIMES)
+    given: dict[str, Any] = {"population": "fixed-volume", "orders": (0, 2)}
+    ds, truth = simulated(model, TIMES, 44, **given), sx.solve(model, TIMES)
     left = np.exp(-rate * np.array(TIMES))
     number = density * left / (1 + density * (1 - left) / (2 * rate))
     np.testing.assert_allclose(truth["number_density"][0], number, rtol=1e-6)
@@ -187,6 +188,7 @@ def test_particles_collide_leave_or_stay() -> None:
     np.testing.assert_array_equal(ds["volume"], volume)
     removed = ds["events"].sel(process="removal")
     np.testing.assert_array_equal(ds["particles"] + ds["collisions"] + removed, 1000)
+    np.testing.assert_array_equal(ds["mass"] + ds["mass_out"], 1000)
     laws.agree(ds["number_density"].values, number)
     laws.agree(ds["collisions"].values / volume, truth["collisions"].values[0])
 

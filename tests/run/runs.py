@@ -46,6 +46,7 @@ def written(group: Group, path: Path) -> Group:
     checkpoints.save(path, group.plan, [group])
     (again,) = checkpoints.load(path, group.plan.model)[1]
     assert isinstance(again, Group)
+    assert (again.first, again.seconds) == (group.first, group.seconds)
     again.loop = group.loop
     return again
 

@@ -297,6 +297,18 @@ def test_a_full_disk_leaves_the_older_file(path: Path, monkeypatch: pytest.Monke
     runs.assert_same(simulate(), go_on(path)[0])
 
 
+def test_a_plan_is_read_as_it_was_written(path: Path) -> None:
+    """Of settings none of which is what it is if nothing is said."""
+    plan = runs.plan(
+        runs.model(0.1), [0.25, 2.0], "size-class", weighting=sx.weighting.WeightFunction(0.5),
+        population="none", particles=3000, replicas=9, seed=2**70, orders=(0.5, 2), sizes=7,
+        bins_per_octave=3, distribution=True, target_error=0.01, target="M2", max_replicas=77,
+        subvolumes=3, remix=0.5,
+    )  # fmt: skip
+    checkpoints.save(path, plan, [])
+    assert checkpoints.load(path) == (plan, [])
+
+
 def test_no_pickle(path: Path) -> None:
     stopped(path, distribution=True)
     with zipfile.ZipFile(path) as archive:

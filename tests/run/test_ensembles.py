@@ -215,6 +215,7 @@ def test_intervals_of_efficiencies_hold_the_scatter_of_variances():
         assert np.log(found[name] / found[f"{name}_lower"])[1] == pytest.approx(width, rel=0.25)
 
 
+@pytest.mark.filterwarnings("default:from t = .* mass lies beyond:smolux.errors.SmoluxWarning")
 @pytest.mark.parametrize(
     ("kernel", "t", "expected"),
     [

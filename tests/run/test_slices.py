@@ -59,7 +59,7 @@ def finished(group: Group, budget: int) -> Group:
 
 
 def assert_same(one: Group, other: Group, a: Any, b: Any) -> None:
-    for name in ("rng", "clock", "count", "events"):
+    for name in ("rng", "clock", "count", "events", "attempts"):
         values = getattr(one.state, name)[a], getattr(other.state, name)[b]
         np.testing.assert_array_equal(*values, err_msg=name)
     for name in one.tally._fields:

@@ -139,6 +139,19 @@ def test_stated_bounds_of_time(bounds: Any, expected: float) -> None:
     assert TimeFunction.of(square_spike).bounds(28, 32) == (0.0, 0.0)
 
 
+def test_windows_bound_a_factor_up_to_their_ends() -> None:
+    """Of encounters the sum, without single particles; the last window begins after the end."""
+    rising = Shattering("0.1 + t")
+    windows = windows_for([Aggregation(), rising, Removal(0.1, varying="1 + t")], 10.0)
+    begun = windows.edges[:-1] < 10.0
+    ends = windows.edges[1:][begun]
+    assert ends[-1] >= 10.0
+    for k, least in enumerate((np.ones_like(ends), 0.1 + ends, 1.0 + ends)):
+        assert (least <= windows.bounds[begun, k]).all()
+        assert (windows.bounds[begun, k] <= 1.02 * least).all()
+    np.testing.assert_allclose(windows.total, windows.bounds[:, :2].sum(axis=1))
+
+
 def test_breakpoints_end_windows() -> None:
     low, high = np.sqrt(900.0), np.sqrt(900.06)
     stated = sx.law(square_spike, breakpoints=[high, low])
