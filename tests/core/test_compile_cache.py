@@ -350,7 +350,7 @@ def test_laws_of_processes_make_loops_of_their_own() -> None:
 
     alone = [p.Removal("k/10"), p.Removal("k**2/10"), p.Evaporation("k/10"), p.Source(1.0)]
     in_time = [p.Removal("k/10", varying="1 + t"), p.Removal("k/10", varying="2 + t")]
-    keys = [key(), *(key(each) for each in (*alone, *in_time)), key(alone[0], alone[1])]
+    keys = [key(), *(key(each) for each in (*alone, *in_time)), key(alone[0], p.Evaporation(0.1))]
     assert len(set(keys)) == len(keys)
     assert key(p.Removal(0.1)) == key(p.Removal(0.2))  # numbers are data
 

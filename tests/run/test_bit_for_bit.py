@@ -82,11 +82,11 @@ def test_threads_and_groups(method: str, rate: Any, monkeypatch: pytest.MonkeyPa
 
 
 def test_groups_hold_each_replica_once() -> None:
-    for replicas, start, workers in ((7, 0, 2), (5, 0, 3), (9, 4, 2), (3, 0, 8)):
-        plan = runs.plan(runs.model(), TIMES, "size-class", replicas=replicas)
+    for number, start, workers in ((7, 0, 2), (5, 0, 3), (9, 4, 2), (3, 0, 8)):
+        plan = runs.plan(runs.model(), TIMES, "size-class", replicas=number)
         groups = plan.groups(workers, start)
         assert [r for first, n in groups for r in range(first, first + n)] == list(
-            range(start, replicas)
+            range(start, number)
         )
 
 

@@ -51,8 +51,15 @@ def go_on(path: Path, most: int = 10_000, **settings: Any) -> tuple[Any, int]:
     raise AssertionError("a run that is stopped again and again must come to its end")
 
 
-@pytest.mark.parametrize("distribution", [False, True])
-@pytest.mark.parametrize("method", runs.METHODS)
+@pytest.mark.parametrize(
+    ("method", "distribution"),
+    [
+        # whole populations are written besides all else
+        pytest.param(m, whole, marks=() if whole or m in QUICK else pytest.mark.slow)
+        for m in runs.METHODS
+        for whole in (False, True)
+    ],
+)
 def test_stopped_again_and_again(method: str, distribution: bool, path: Path) -> None:
     # a constant rate brings fewer events
     given: dict[str, Any] = {} if method in QUICK else {"rate": 0.1, "particles": 6000}

@@ -226,9 +226,7 @@ def test_intervals_of_efficiencies_hold_the_scatter_of_variances():
     ],
 )
 def test_the_bias_is_against_the_solution(kernel: Any, t: float, expected: Any):
-    plan = make_plan(
-        sx.Model(kernel), [t], METHOD, "number", "none", 20, 1, 1, (0, 2), 8, 1, False
-    )
+    plan = make_plan(sx.Model(kernel), [t], METHOD, "number", "none", 20, 1, 1, (0, 2), 8, 1, False)
     goals = [_goal(name, plan.orders, plan.sizes, []) for name in NAMES]
     found = _reference(SimpleNamespace(plan=plan, goals=goals), NAMES, None)[0]  # type: ignore[arg-type]
     for one, value in zip(found[:, 0], expected, strict=True):

@@ -39,7 +39,7 @@ def agree(values: Any, expected: Any) -> None:
 
 @pytest.mark.parametrize("method", QUICK)
 def test_densities_of_sizes_and_of_bins(method: str) -> None:
-    """Bins hold the sizes of their edges, the first of them 7 alone; the volume is doubled twice."""
+    """Bins hold the sizes of their edges, the first one 7 alone; the volume is doubled twice."""
     ds = simulate(method, "doubling")
     last = ds.isel(time=-1)
     np.testing.assert_array_equal(ds["volume"].isel(time=0), PARTICLES / DENSITY)

@@ -21,7 +21,7 @@ ROUNDING = 1e-14
 
 quick = settings(max_examples=20, deadline=None, derandomize=True)
 
-#: every law, several with more than one set of parameters; no scale is one, which hides what lacks it
+#: every law, several with more than one set of parameters; a scale of one hides what lacks it
 LAWS: list[Kernel] = [law(**law.example, scale=2.5) for law in KERNELS] + [
     kernels.Bilinear(0.0, 0.0, scale=3.0),
     kernels.Bilinear(2.0, 0.0, scale=0.1),

@@ -102,7 +102,7 @@ def test_kernels() -> None:
     ],
 )
 def test_bounds_by_trial_hold(function: object, box: tuple[int, int, int, int]) -> None:
-    """Of differences and sizes that a law names, of peaks between, and of a little that is missed."""
+    """Of differences and sizes that a law names, of peaks, and of a little that is missed."""
     kernel = kernels.from_function(function)
     assert not kernel.rigorous
     a, b, c, d = box
