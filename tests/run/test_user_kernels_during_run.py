@@ -339,7 +339,7 @@ def test_a_raised_bound_of_a_factor_lasts(tmp_path: Path, monkeypatch: pytest.Mo
 
     group = in_pieces(Group.start(plan, 0, plan.replicas), tmp_path / "run.npz", 4, look)
     assert_same_end(whole, group)
-    raised = before[:, 1] == 1
+    raised = before[:, 1] > 0
     merged, shattered = (group.state.events - before)[raised].T
     excess = merged - shattered
     assert raised.sum() > 150
