@@ -43,6 +43,7 @@ def plan(model: sx.Model, times: Any, method: str, **settings: Any) -> Plan:
 
 def written(group: Group, path: Path) -> Group:
     """Return what a checkpoint leaves of a group."""
+    group.seconds += 1.0
     checkpoints.save(path, group.plan, [group])
     (again,) = checkpoints.load(path, group.plan.model)[1]
     assert isinstance(again, Group)

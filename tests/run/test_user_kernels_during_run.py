@@ -342,7 +342,7 @@ def test_a_raised_bound_of_a_factor_lasts(tmp_path: Path, monkeypatch: pytest.Mo
     raised = before[:, 1] > 0
     merged, shattered = (group.state.events - before)[raised].T
     excess = merged - shattered
-    assert raised.sum() > 150
+    assert raised.sum() > 80
     assert abs(excess.mean()) < 4.5 * excess.std() / np.sqrt(len(excess))
     # for the one that shattered by the bound one did not
     np.testing.assert_allclose(group.state.missed[raised, BY_FACTOR + 1], 1.0)
