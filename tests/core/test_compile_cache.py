@@ -158,6 +158,16 @@ def test_functions_of_one_name_are_told_apart() -> None:
 
 
 @pytest.mark.slow
+def test_defaults_are_content() -> None:
+    def made(a: float) -> Callable[..., float]:
+        def f(x: float, a: float = a) -> float:
+            return a * x
+
+        return f
+
+    assert digest(made(1.0)) == digest(made(1.0)) != digest(made(2.0))
+
+
 def test_an_address_that_is_used_again_is_another_function() -> None:
     class Fleeting(types.ModuleType):
         """A module that makes its functions when they are asked for."""

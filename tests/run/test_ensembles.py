@@ -260,6 +260,8 @@ def test_table_and_figure(measured: Any, tmp_path: Path):
     text = sx.ensembles.efficiency_table(measured)
     assert "n_50 at t = 20" in text
     assert "weight-function=1" in text
+    place = measured.isel(scheme=0).sel(observable="M2", time=20.0)
+    assert f" {float(100 * place['bias'] / place['reference']):.3g} " in text
     figure = sx.plotting.efficiency(measured)
     assert len(figure.axes) == 2
     assert sx.plotting.save(figure, tmp_path / "eff.png").stat().st_size > 5000
