@@ -18,7 +18,7 @@ import pytest
 
 import smolux as sx
 from smolux import files
-from smolux.assembly import loop_for
+from smolux.assembly import _key, loop_for
 from smolux.content import digest
 from smolux.core import compile as compiling
 from smolux.core.compile import cache_directory, statistics
@@ -146,6 +146,16 @@ def test_all_that_is_taken_from_a_module_counts() -> None:
 
     assert taken(1.0, 2.0, 3.0) == taken(1.0, 2.0, 4.0)
     assert len({taken(1.0, 2.0, 3.0), taken(1.5, 2.0, 3.0), taken(1.0, 2.5, 3.0)}) == 3
+
+
+def test_defaults_are_content() -> None:
+    def made(a: float) -> Callable[..., float]:
+        def f(x: float, a: float = a) -> float:
+            return a * x
+
+        return f
+
+    assert digest(made(1.0)) == digest(made(1.0)) != digest(made(2.0))
 
 
 def test_functions_of_one_name_are_told_apart() -> None:
@@ -339,6 +349,20 @@ def test_values_of_parameters_share_the_loop() -> None:
     formula = sx.kernels.formula
     assert loop(formula("a*(i+j)", a=1.0), 0.1) is loop(formula("a*(i+j)", a=2.0), 0.2)
     assert loop(formula("i+j"), 0.1) is not loop(formula("j+i"), 0.1)
+
+
+def test_laws_of_processes_make_loops_of_their_own() -> None:
+    p, kernel = sx.processes, sx.kernels.Constant()
+
+    def key(*others: Any) -> Any:
+        model = sx.Model(kernel, [p.Aggregation(), *others])
+        return _key(model, sx.methods.METHODS[0](), Number())
+
+    alone = [p.Removal("k/10"), p.Removal("k**2/10"), p.Evaporation("k/10"), p.Source(1.0)]
+    in_time = [p.Removal("k/10", varying="1 + t"), p.Removal("k/10", varying="2 + t")]
+    keys = [key(), *(key(each) for each in (*alone, *in_time)), key(alone[0], p.Evaporation(0.1))]
+    assert len(set(keys)) == len(keys)
+    assert key(p.Removal(0.1)) == key(p.Removal(0.2))  # numbers are data
 
 
 def test_what_a_weighting_compiles_in_makes_another_loop() -> None:

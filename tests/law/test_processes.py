@@ -276,6 +276,26 @@ def test_nothing_is_left() -> None:
     laws.agree(ds["mass"].values[:, 0], 50 * np.exp(-1.0))
 
 
+def test_particles_collide_leave_or_stay() -> None:
+    """With the density 2.5: ``M0 = 2.5 q / (1 + 2.5 (1 - q) / 2 r)``, ``q = exp(-r t)``."""
+    rate, density = 0.3, 2.5
+    model = everything(removal=rate, initial=sx.initial.monodisperse(density))
+    given: dict[str, Any] = {"population": "fixed-volume", "orders": (0, 2)}
+    ds, truth = simulated(model, TIMES, 44, **given), sx.solve(model, TIMES)
+    left = np.exp(-rate * np.array(TIMES))
+    number = density * left / (1 + density * (1 - left) / (2 * rate))
+    np.testing.assert_allclose(truth["number_density"][0], number, rtol=1e-6)
+    gone = density - number - truth["events"].sel(process="removal").values[0]
+    np.testing.assert_allclose(truth["collisions"][0], gone, rtol=1e-5)
+    volume = 1000 / density
+    np.testing.assert_array_equal(ds["volume"], volume)
+    removed = ds["events"].sel(process="removal")
+    np.testing.assert_array_equal(ds["particles"] + ds["collisions"] + removed, 1000)
+    np.testing.assert_array_equal(ds["mass"] + ds["mass_out"], 1000)
+    laws.agree(ds["number_density"].values, number)
+    laws.agree(ds["collisions"].values / volume, truth["collisions"].values[0])
+
+
 def test_debris_of_monomers_is_shattering() -> None:
     kernel, times = laws.kernel("constant"), [1.0, 6.0]
     monomers, shattering = (
@@ -375,6 +395,7 @@ def test_source_and_sink_oscillate() -> None:
         (lambda: P.Evaporation(-1.0), "the evaporation rate = -1.0: is -1 for the size 1"),
         (lambda: P.Evaporation("q"), "unknown name 'q'"),
         (lambda: P.Evaporation([]), "must be a number, a formula in k"),
+        (lambda: P.Evaporation([0.0, 1.0, -2.0]), "is -2 for the size 3"),
         (lambda: P.Evaporation.free_molecular(-1.0, np.nan), "steepness = nan"),
         (lambda: P.Fragmentation(0.0), "a finite number above zero"),
         (lambda: P.Fragmentation("i - j"), "the fragmentation rate"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 
 import smolux as sx
 from shared import FORMULA, QUICK, VARYING
+from smolux import checkpoint as checkpoints
 from smolux.plan import Plan, make_plan
+from smolux.replicas import Group
 
 METHODS = [method.name for method in sx.methods.METHODS]
 #: the method, and whether the rate varies: its loop is another one
@@ -36,6 +39,17 @@ def plan(model: sx.Model, times: Any, method: str, **settings: Any) -> Plan:
         "seed": 5, "orders": (0, 1, 2), "sizes": 40, "bins_per_octave": 2, "distribution": False,
     } | settings  # fmt: skip
     return make_plan(model, times, method, **given)
+
+
+def written(group: Group, path: Path) -> Group:
+    """Return what a checkpoint leaves of a group."""
+    group.seconds += 1.0
+    checkpoints.save(path, group.plan, [group])
+    (again,) = checkpoints.load(path, group.plan.model)[1]
+    assert isinstance(again, Group)
+    assert (again.first, again.seconds) == (group.first, group.seconds)
+    again.loop = group.loop
+    return again
 
 
 def _shared(values: Any, **places: Any) -> Any:

@@ -17,6 +17,7 @@ from smolux import case as cases
 from smolux import checkpoint, pilot
 from smolux.cli import running
 from smolux.errors import InputError
+from smolux.goal import Goal
 from smolux.plan import Plan, event_cost, make_plan
 
 METHOD = "acceptance-rejection"
@@ -69,6 +70,31 @@ def test_sizes_too_rare_to_be_seen_are_counted_by_their_weight() -> None:
     """No pilot sees the size 400 at t = 1; more of it are expected the larger the weight is."""
     found = pilot.settled(plan("n_400", times=[1.0]))
     assert power(found) >= 1.0
+
+
+@pytest.mark.parametrize(
+    ("deviations", "mean", "costs", "chosen"),
+    [
+        ([[0.1, 0.1], [0.05, 0.05]], 1.0, (1.0, 1.0), "mass-flow"),
+        ([[0.1, 0.1], [0.05, 0.05]], 1.0, (1.0, 8.0), "number"),  # four times better, but dear
+        ([[0.1, 0.1], [0.1, 0.1]], 1.0, (8.0, 1.0), "mass-flow"),
+        ([[0.1, 0.1], [0.01, 0.5]], 1.0, (1.0, 1.0), "number"),  # at the worst time
+        ([[0.1, 0.1], [0.5, 0.5]], 10.0, (1.0, 1.0), "mass-flow"),  # relative to the mean
+    ],
+)
+def test_what_a_weighting_is_worth(
+    deviations: Any, mean: float, costs: tuple[float, float], chosen: str
+) -> None:
+    noise = np.random.default_rng(1).standard_normal((200, 2))
+    trials = [
+        pilot._Trial(weighting, scale * (1 + np.array(d) / scale * noise), np.ones((200, 2)), cost)
+        for weighting, d, scale, cost in zip(
+            (sx.weighting.Number(), sx.weighting.MassFlow()), deviations, (1.0, mean), costs,
+            strict=True,
+        )
+    ]  # fmt: skip
+    goal = Goal("M2", 0.5, 2, 2)
+    assert pilot._compared(goal, trials)[0].name == chosen
 
 
 def test_what_has_no_scatter_is_left_alone() -> None:

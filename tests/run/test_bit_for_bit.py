@@ -81,6 +81,15 @@ def test_threads_and_groups(method: str, rate: Any, monkeypatch: pytest.MonkeyPa
             runs.assert_same(expected, simulate(method, rate, replicas=5, executor=executor))
 
 
+def test_groups_hold_each_replica_once() -> None:
+    for number, start, workers in ((7, 0, 2), (5, 0, 3), (9, 4, 2), (3, 0, 8)):
+        plan = runs.plan(runs.model(), TIMES, "size-class", replicas=number)
+        groups = plan.groups(workers, start)
+        assert [r for first, n in groups for r in range(first, first + n)] == list(
+            range(start, number)
+        )
+
+
 def test_processes() -> None:
     with ProcessPoolExecutor(1) as executor:
         for method in runs.METHODS:

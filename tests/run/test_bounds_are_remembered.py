@@ -84,6 +84,20 @@ def test_what_a_function_reads_may_change(monkeypatch: pytest.MonkeyPatch, weigh
     np.testing.assert_allclose(after, factor * before)
 
 
+def test_laws_and_weightings_are_told_apart() -> None:
+    """On disk, and in the table that was made last."""
+    formula, sizes = sx.kernels.formula, np.arange(1.0, 6.0)
+    one, other = formula("a*(i + j)", a=1.0), formula("a*(i + j)", a=2.0)
+    kinds = [(k, w) for k in (one, other, formula("i*j")) for w in (Number(), WeightFunction(0.5))]
+    for _ in range(2):  # the second time they are read
+        for kernel, weighting in kinds:
+            rates, right = rates_for(sx.Model(kernel), weighting), weighting.bounds(kernel)
+            for found, expected in zip(rates.bounds(*BOXES), right(*BOXES), strict=True):
+                np.testing.assert_array_equal(found, expected)
+            np.testing.assert_array_equal(rates.table(5), rates.arrays(sizes[:, None], sizes))
+        forget()
+
+
 def test_no_more_than_some_are_remembered() -> None:
     rates = rates_for(sx.Model(Additive(0.125)), MassFlow())
     for k in range(1, 80):

@@ -148,6 +148,13 @@ def test_what_is_frozen_does_not_change(monkeypatch: pytest.MonkeyPatch) -> None
     assert frozen(by_helper) is now
 
 
+def test_a_list_that_is_read_is_that_of_the_start() -> None:
+    held = [2.0, 3.0]
+    now = frozen(lambda i, j: held[0] * i * j)
+    held[0] = 5.0
+    assert now(1.0, 1.0) == 2.0
+
+
 def test_attributes_of_classes_and_objects_are_content() -> None:
     class Settings:
         width = 1.0

@@ -52,8 +52,15 @@ def go_on(path: Path, most: int = 10_000, **settings: Any) -> tuple[Any, int]:
     raise AssertionError("a run that is stopped again and again must come to its end")
 
 
-@pytest.mark.parametrize("distribution", [False, True])
-@pytest.mark.parametrize("method", runs.METHODS)
+@pytest.mark.parametrize(
+    ("method", "distribution"),
+    [
+        # whole populations are written besides all else
+        pytest.param(m, whole, marks=() if whole or m in QUICK else pytest.mark.slow)
+        for m in runs.METHODS
+        for whole in (False, True)
+    ],
+)
 def test_stopped_again_and_again(method: str, distribution: bool, path: Path) -> None:
     # a constant rate brings fewer events
     given: dict[str, Any] = {} if method in QUICK else {"rate": 0.1, "particles": 6000}
@@ -330,6 +337,18 @@ def test_a_full_disk_leaves_the_older_file(path: Path, monkeypatch: pytest.Monke
     assert path.read_bytes() == older
     assert [p.name for p in path.parent.iterdir()] == [path.name]
     runs.assert_same(simulate(), go_on(path)[0])
+
+
+def test_a_plan_is_read_as_it_was_written(path: Path) -> None:
+    """Of settings none of which is what it is if nothing is said."""
+    plan = runs.plan(
+        runs.model(0.1), [0.25, 2.0], "size-class", weighting=sx.weighting.WeightFunction(0.5),
+        population="none", particles=3000, replicas=9, seed=2**70, orders=(0.5, 2), sizes=7,
+        bins_per_octave=3, distribution=True, target_error=0.01, target="M2", max_replicas=77,
+        subvolumes=3, remix=0.5,
+    )  # fmt: skip
+    checkpoints.save(path, plan, [])
+    assert checkpoints.load(path) == (plan, [])
 
 
 def test_no_pickle(path: Path) -> None:

@@ -11,13 +11,16 @@ import smolux as sx
 from smolux import processes
 from smolux.cli.estimate import Pilot
 from smolux.plan import Plan, make_plan
+from smolux.windows import windows_for
 
 
-def planned(varying: Any, parts: int = 1, end: float = 10.0) -> Plan:
+def planned(
+    varying: Any, parts: int = 1, end: float = 10.0, weighting: str = "number", times: Any = None
+) -> Plan:
     kinds = [processes.Aggregation(), processes.Source({1: 1.5, 2: 0.5}, varying=varying)]
     model = sx.Model(sx.kernels.Constant(), kinds, sx.initial.empty())
     return make_plan(
-        model, [end], "size-class", "number", "doubling", 2000, 1, 1, (0, 1), 8, 4, False,
+        model, times or [end], "size-class", weighting, "doubling", 2000, 1, 1, (0, 1), 8, 4, False,
         subvolumes=parts,
     )  # fmt: skip
 
@@ -28,6 +31,20 @@ def planned(varying: Any, parts: int = 1, end: float = 10.0) -> Plan:
 )
 def test_the_volume_follows_from_the_mean_inflow(varying: Any, mean: float) -> None:
     assert planned(varying).volume == pytest.approx(2000 / (2.0 * mean), rel=2e-3)
+
+
+def test_the_volume_counts_what_is_simulated_until_the_end() -> None:
+    """By mass, one of the size two counts twice; the first output time does not matter."""
+    assert planned("t", weighting="mass-flow").volume == pytest.approx(2000 / (2.5 * 5), rel=2e-3)
+    assert planned("t", times=[1.0, 10.0]).volume == pytest.approx(2000 / (2.0 * 5), rel=2e-3)
+
+
+def test_a_source_brings_in_what_is_simulated() -> None:
+    """By mass, half a dimer beside one and a half monomers is two fifths."""
+    plan = planned(1.0, weighting="mass-flow")
+    windows = windows_for(plan.model.processes, 10.0, plan.weighting)
+    np.testing.assert_allclose(windows.inflow, [2.5])
+    np.testing.assert_allclose(windows.share, [[0.6, 1.0]])
 
 
 def test_nothing_comes_in_is_said() -> None:

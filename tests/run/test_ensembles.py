@@ -7,17 +7,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import smolux as sx
 from shared import FORMULA, extinction
 from smolux.ensembles import Moments
-from smolux.ensembles.batches import Sampler, make_sampler
+from smolux.ensembles.batches import Batch, Sampler, _goal, make_sampler
+from smolux.ensembles.efficiency import _compared, _reference
+from smolux.ensembles.ensemble import Collected
 from smolux.errors import InputError
 from smolux.exact import finite
+from smolux.plan import make_plan
 
 METHOD = "acceptance-rejection"
 MODEL = sx.Model(kernel=sx.kernels.Constant())
@@ -82,6 +87,8 @@ def test_the_replicas_are_those_of_simulate(q: float):
     )
     np.testing.assert_allclose(found["mean"], rows.mean(axis=0), rtol=1e-12)
     np.testing.assert_allclose(found["variance"], rows.var(axis=0, ddof=1), rtol=1e-9)
+    error = rows.std(axis=0, ddof=1) / np.sqrt(203)
+    np.testing.assert_allclose(found["standard_error"], error, rtol=1e-9)
     assert float(found["collisions"]) * 203 == pytest.approx(ds.attrs["events"], rel=1e-12)
 
 
@@ -173,8 +180,57 @@ def test_efficiency_is_what_it_says(measured: Any):
     np.testing.assert_allclose(measured["ratio"], ratio)
     inside = (measured["ratio_lower"] <= ratio) & (ratio <= measured["ratio_upper"])
     assert inside.all()
+    assert (measured["bias_lower"] < measured["bias"]).all()
+    assert (measured["bias"] < measured["bias_upper"]).all()
     top = measured["efficiency"] == measured["efficiency"].max("scheme")
     assert measured["best"].where(top, True).all()
+
+
+def test_cost_of_a_replica():
+    """Batches of 10, 10 and 5 replicas: the mean is over replicas, the scatter over whole ones."""
+    source = sampler(("M2",), [1.0], 20, 200)
+    whole, last = (source.batch(first, n, lambda: False) for first, n in ((0, 10), (10, 5)))
+    found = Collected(replace(whole, seconds=20.0))
+    for batch, seconds in ((whole, 40.0), (last, 15.0)):
+        found.add(replace(batch, seconds=seconds))
+    assert found.cost() == pytest.approx((3.0, 1 / 3, 2))
+    upper, lower = (found.variables()[f"cost_{end}"][1] for end in ("upper", "lower"))
+    assert np.log([upper / 3, 3 / lower]) == pytest.approx(stats.t.ppf(0.975, 1) / 3)
+
+
+def test_intervals_of_efficiencies_hold_the_scatter_of_variances():
+    """Of 400 normal numbers a variance has the relative standard error ``sqrt(2/399)``."""
+    values = np.random.default_rng(7).standard_normal((2, 20, 20, 1, 1))
+    schemes = []
+    for rows in values:
+        parts = [Batch(Moments.of(part), None, 1.0) for part in rows]  # type: ignore[arg-type]
+        schemes.append(Collected(parts[0]))
+        for part in parts[1:]:
+            schemes[-1].moments += part.moments
+            schemes[-1].spent.append((20, 1.0))
+    found = _compared(schemes)
+    half = 1.96 * np.sqrt(2 / 399)
+    for name, width in (("efficiency", half), ("ratio", np.sqrt(2) * half)):
+        assert np.log(found[f"{name}_upper"] / found[name])[1] == pytest.approx(width, rel=0.25)
+        assert np.log(found[name] / found[f"{name}_lower"])[1] == pytest.approx(width, rel=0.25)
+
+
+@pytest.mark.filterwarnings("default:from t = .* mass lies beyond:smolux.errors.SmoluxWarning")
+@pytest.mark.parametrize(
+    ("kernel", "t", "expected"),
+    [
+        (sx.kernels.Constant(), 4.0, [1 / 3, 5.0, 4 / 81, np.nan]),
+        (sx.kernels.formula("1 + 0*i*j"), 4.0, [1 / 3, 5.0, 4 / 81, np.nan]),
+        # a gel that reacts: n_k = k**(k - 2) t**(k - 1) exp(-k t) / k!
+        (sx.kernels.formula("i*j", gels=True), 1.5, [None, None, 1.125 * np.exp(-4.5), np.nan]),
+    ],
+)
+def test_the_bias_is_against_the_solution(kernel: Any, t: float, expected: Any):
+    plan = make_plan(sx.Model(kernel), [t], METHOD, "number", "none", 20, 1, 1, (0, 2), 8, 1, False)
+    goals = [_goal(name, plan.orders, plan.sizes, []) for name in NAMES]
+    found = _reference(SimpleNamespace(plan=plan, goals=goals), NAMES, None)[0]  # type: ignore[arg-type]
+    for one, value in zip(found[:, 0], expected, strict=True):
+        assert value is None or one == pytest.approx(value, rel=1e-5, nan_ok=True)
 
 
 @pytest.mark.parametrize(("slower", "told"), [(1.0, False), (2.0, True)])
@@ -196,6 +252,7 @@ def test_the_same_twice_is_not_told_apart(
     )  # fmt: skip
     assert ds["best"].isel(scheme=0).all()
     assert bool(ds["best"].isel(scheme=1).all()) != told
+    assert float(ds["mean"].std()) > 0.0  # each has random numbers of its own
     assert ds.attrs["reference"] == "given"
 
 
@@ -203,6 +260,8 @@ def test_table_and_figure(measured: Any, tmp_path: Path):
     text = sx.ensembles.efficiency_table(measured)
     assert "n_50 at t = 20" in text
     assert "weight-function=1" in text
+    place = measured.isel(scheme=0).sel(observable="M2", time=20.0)
+    assert f" {float(100 * place['bias'] / place['reference']):.3g} " in text
     figure = sx.plotting.efficiency(measured)
     assert len(figure.axes) == 2
     last = measured.isel(time=-1)

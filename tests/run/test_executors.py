@@ -24,7 +24,7 @@ import runs
 import smolux as sx
 from smolux import driving, executors, replicas, stochastic
 from smolux.errors import InputError, Interrupted, WorkerError
-from smolux.executors import RETRIES, completed, opened
+from smolux.executors import RETRIES, _renewed, completed, opened
 
 
 class InThisProcess(Executor):
@@ -88,6 +88,15 @@ def test_tasks_whose_worker_died_are_run_again(tmp_path: Path) -> None:
     with ProcessPoolExecutor(2) as pool:
         found = finished(pool, [(k, tmp_path, k % 2) for k in range(6)])
     assert found == {k: k * k for k in range(6)}
+
+
+def test_a_pool_in_place_of_one_that_broke_is_like_it() -> None:
+    with ProcessPoolExecutor(3, initializer=square, initargs=(2, Path(), 0)) as given:
+        new: Any = _renewed(given, given)
+        with new:
+            assert new is not given
+            assert (new._max_workers, new._initializer) == (3, square)
+            assert new._initargs == (2, Path(), 0)
 
 
 def test_one_that_kills_every_worker_is_found(tmp_path: Path) -> None:

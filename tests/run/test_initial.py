@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 import runs
+from scipy import stats
 
 import smolux as sx
 from shared import QUICK
 from smolux.case import parse
 from smolux.cli.estimate import physics_warnings
+from smolux.initial import base
 from smolux.replicas import initial_populations
 
 INITIALS = {
@@ -83,6 +85,24 @@ def test_mean_mass(initial: Any) -> None:
     assert abs(np.mean(mass) - PARTICLES * expected) < 4.5 * error
 
 
+@every_initial
+def test_quantiles_are_the_sizes_at_which_a_share_is_passed(initial: Any) -> None:
+    shares = np.random.default_rng(1).random(500)
+    sizes = initial.quantile(shares)
+    below, upto = (initial.cumulative(sizes - float(k)) for k in (1, 0))
+    assert (below <= shares + 1e-12).all()
+    assert (shares <= upto + 1e-12).all()
+
+
+def test_populations_drawn_in_batches_are_those_drawn_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    whole = INITIALS["far"].sample(PARTICLES, 0.3)
+    monkeypatch.setattr(base, "_BATCH", 100)
+    for one, other in zip(whole, INITIALS["far"].sample(PARTICLES, 0.3), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 def test_exponential_densities_are_geometric() -> None:
     n = INITIALS["exponential"].densities(400)
     k = np.arange(1, 401)
@@ -99,6 +119,16 @@ def test_lognormal_median_and_width() -> None:
     assert np.exp((k * n).sum()) == pytest.approx(1000.0, rel=1e-4)
     width = np.sqrt((k**2 * n).sum() - (k * n).sum() ** 2)
     assert np.exp(width) == pytest.approx(1.5, rel=1e-4)
+
+
+def test_tails_of_the_lognormal_law() -> None:
+    """Nine standard deviations above the median, and as far below, no digit is lost."""
+    for median, sigma, k in ((6.0, 1.6, 420.0), (1e4, 2.0, 20.0)):
+        law = stats.lognorm(s=np.log(sigma), scale=median)
+        upper = law.sf(k - 0.5) - law.sf(k + 0.5)
+        expected = upper if k > median else law.cdf(k + 0.5) - law.cdf(k - 0.5)
+        found = sx.initial.lognormal(median, sigma, density=0.2).densities(int(k))[-1]
+        assert found == pytest.approx(0.2 * expected, rel=1e-9, abs=0.0)
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import runs
 
 import smolux as sx
-from smolux import checkpoint as checkpoints
 from smolux import files, processes
 from smolux.core.state import GROW, STORED
 from smolux.methods import acceptance_rejection, base, inverse, low_rank, size_class
@@ -59,7 +59,7 @@ def finished(group: Group, budget: int) -> Group:
 
 
 def assert_same(one: Group, other: Group, a: Any, b: Any) -> None:
-    for name in ("rng", "clock", "count", "events"):
+    for name in ("rng", "clock", "count", "events", "attempts"):
         values = getattr(one.state, name)[a], getattr(other.state, name)[b]
         np.testing.assert_array_equal(*values, err_msg=name)
     for name in one.tally._fields:
@@ -137,15 +137,6 @@ def cut(group: Group) -> Group:
     return group
 
 
-def written(group: Group, path: Path) -> Group:
-    """Return what a checkpoint leaves of a group."""
-    checkpoints.save(path, group.plan, [group])
-    (again,) = checkpoints.load(path)[1]
-    assert isinstance(again, Group)
-    again.loop = group.loop
-    return again
-
-
 @pytest.mark.parametrize(
     ("case", "population"),
     [
@@ -184,7 +175,7 @@ def test_growth_by_the_least_and_resuming_at_every_slice(
                 group._serve()
             turn += 1
             if turn % every == 0:
-                group = written(group, tmp_path / "run.npz")
+                group = runs.written(group, tmp_path / "run.npz")
         assert_same(whole, group, slice(None), slice(None))
     # the inverse method counts the sizes that come here, and has no list of large ones to grow
     assert grown or (method == "inverse" and case in ("open", "pairs"))

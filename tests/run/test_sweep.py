@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import smolux as sx
 from shared import FORMULA
 from smolux.errors import InputError, Interrupted
 from smolux.sweeps import Folder, grid, read_axes
-from smolux.sweeps.points import derived
+from smolux.sweeps.points import derived, make_sweep
 
 CASE = f"""\
 title = "grid"
@@ -126,10 +127,22 @@ def test_mistakes_in_the_case_come_before_anything_is_computed(case: Path, tmp_p
 
 
 @pytest.fixture(scope="module")
-def expected(tmp_path_factory: pytest.TempPathFactory) -> Any:
+def told() -> list[Any]:
+    """What the sweep that is expected has told of its progress."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory: pytest.TempPathFactory, told: list[Any]) -> Any:
     folder = tmp_path_factory.mktemp("expected")
     (folder / "case.toml").write_text(CASE)
-    return sx.sweep(folder / "case.toml", OVER, directory=folder / "s")
+    return sx.sweep(folder / "case.toml", OVER, directory=folder / "s", progress=told.append)
+
+
+def test_progress_is_that_of_all_points(expected: Any, told: list[Any]) -> None:
+    last = told[-1]
+    assert (last.done, last.fraction, last.seconds_left) == (6, 1.0, 0.0)
+    assert last.events == int(expected["collisions"].isel(time=-1).sum())
 
 
 def test_a_dimension_for_each_key(expected: Any) -> None:
@@ -153,6 +166,28 @@ def test_each_point_is_the_run_of_its_case(expected: Any) -> None:
     for name in ("moment", "n", "collisions", "largest", "events"):
         np.testing.assert_array_equal(point[name], ds[name])
     assert int(point["point_seed"]) == derived(7, place)
+
+
+def test_seeds_follow_from_that_of_the_case_and_the_values() -> None:
+    place = {"kernel.c1": 0.5, "run.particles": 100}
+    seed = derived(7, place)
+    assert seed == derived(7, {"run.particles": 100.0, "kernel.c1": 0.5})
+    others = [derived(8, place), derived(7, place | {"kernel.c1": 0.6}), derived(7, {})]
+    assert len({seed, *others}) == 4
+
+
+def test_what_a_folder_holds_is_what_was_asked_for(case: Path, tmp_path: Path) -> None:
+    made, drawn = make_sweep(case, read_axes({"kernel.c1": [0.5, 0.25]}), ["run.particles=160"])
+    assert not drawn
+    for point, value in zip(made.points(), (0.5, 0.25), strict=True):
+        kernel, run = point.case.model.kernel, point.case.run
+        assert run is not None
+        assert (kernel.parameters[1], run.particles) == (value, 160)
+        assert run.seed == derived(7, point.values)
+    folder = Folder(tmp_path / "s")
+    assert folder.begin(made, False) == folder.load() == made
+    # one that was drawn stays
+    assert folder.begin(replace(made, seed=8), True) == made
 
 
 def test_seeds_do_not_depend_on_the_other_points(case: Path, tmp_path: Path, expected: Any) -> None:
@@ -300,8 +335,9 @@ def test_a_seed_that_was_drawn_stays(case: Path, tmp_path: Path) -> None:
     over = {"kernel.c1": [0.5]}
     first = sx.sweep(case, over, directory=tmp_path / "s")
     again = sx.sweep(case, over, directory=tmp_path / "s")
-    other = sx.sweep(case, over, directory=tmp_path / "t")
-    assert first.attrs["seed"] == again.attrs["seed"] != other.attrs["seed"]
+    axes = read_axes(over)
+    assert first.attrs["seed"] == again.attrs["seed"]
+    assert make_sweep(case, axes, [])[0].seed != make_sweep(case, axes, [])[0].seed
     assert Folder(tmp_path / "s").load().seed == int(first.attrs["seed"])
 
 

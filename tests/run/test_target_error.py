@@ -211,6 +211,14 @@ def test_every_output_time_counts() -> None:
     assert pilots < 60
 
 
+def test_pilots_say_what_it_takes() -> None:
+    """A scatter of 4 % takes ``(1.96 * 4)**2 = 61`` replicas for 1 %, and some to be sure."""
+    pilots = 1 + 0.04 * stats.norm.ppf((np.arange(30) + 0.5) / 30)[:, None]
+    trial = plan_replicas(Goal("M2", 0.01, 8, 10_000), pilots, np.array([True]))
+    assert trial.pilots == 30
+    assert 61 <= trial.replicas <= 100
+
+
 def test_what_pilots_do_not_see_takes_more_of_them() -> None:
     goal, moved = Goal("n_30", 0.1, 8, 500), np.array([True])
     assert plan_replicas(goal, np.zeros((8, 1)), moved) == Trial(16, 500)

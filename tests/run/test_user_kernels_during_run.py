@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import runs
+from scipy import stats
 
 import smolux as sx
 from shared import QUICK, extinction
-from smolux import assembly
-from smolux.core.state import REPAIRS
+from smolux import assembly, files
+from smolux.core.state import BY_FACTOR, BY_KERNEL, DONE, EVENTS, EXTINCT, REPAIRS, TIME
 from smolux.errors import InputError, SmoluxWarning
+from smolux.kernels.formula_kernel import FormulaKernel
 from smolux.replicas import Group
 from smolux.timefunction import TimeFunction
 
@@ -243,3 +246,103 @@ def test_a_rate_that_is_seen_to_turn_negative() -> None:
     with pytest.raises(InputError, match=r"is -0\.\d+ at t = 0\.\d+") as caught:
         sx.simulate(runs.model("0.1 - t"), [0.2, 0.5], method=runs.METHODS[0])
     assert "shattering" in str(caught.value)
+
+
+# --- what was raised stays raised, when a run goes on ---------------------------------------------
+
+
+class Low(FormulaKernel):
+    """A law that is one half at most by what is stated."""
+
+    rigorous = False
+
+    def bounds(self, a: Any, b: Any, c: Any, d: Any) -> tuple[Any, Any]:
+        shape = np.broadcast(a, b, c, d).shape
+        return np.zeros(shape), np.full(shape, 0.5)
+
+
+def in_pieces(group: Group, path: Path, budget: int, look: Any) -> Group:
+    """Advance each replica by so many candidates, then write and read all; `look` in between."""
+    while not group.done:
+        for r in np.flatnonzero(group.codes != DONE):
+            alone = np.full(len(group.codes), DONE)
+            alone[r] = group.codes[r]
+            group._call(alone, budget)
+            group.codes[r] = alone[r]
+        group._serve()
+        look(group)
+        group = runs.written(group, path)
+    return group
+
+
+def assert_same_end(one: Group, other: Group) -> None:
+    for kind in ("state", "tally"):
+        for name, values in getattr(one, kind)._asdict().items():
+            np.testing.assert_array_equal(values, getattr(getattr(other, kind), name), name)
+
+
+def test_a_raised_bound_of_the_kernel_lasts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four particles with K = 1; the first candidate is above the bound and raises it.
+
+    Then three are left in the volume four, and merge at the rates 3/4 and 1/4 whatever was stated.
+    """
+    monkeypatch.setattr(files, "_sync", lambda *_: None)  # nothing here is to last
+    known = runs.model(0.0, sx.initial.monodisperse(), c1=0.0)
+    law = known.kernel
+    assert isinstance(law, FormulaKernel)
+    physics = replace(known, kernel=Low(law.expression, law.names, law.values))
+    plan = runs.plan(
+        physics, [4.0, 1e6], "acceptance-rejection", population="none", particles=4, sizes=4,
+        replicas=400, bins_per_octave=1,
+    )  # fmt: skip
+    whole = Group.start(plan, 0, plan.replicas)
+    whole.advance(lambda: False)
+    first = np.full(plan.replicas, np.nan)
+
+    def look(group: Group) -> None:
+        one = group.state.count[:, EVENTS] == 1
+        first[one] = group.state.clock[one, TIME]
+
+    group = in_pieces(Group.start(plan, 0, plan.replicas), tmp_path / "run.npz", 1, look)
+    assert_same_end(whole, group)
+    rest = (group.state.clock[:, EXTINCT] - first) / 4.0
+    exact = stats.kstest(rest, lambda t: 1 - 1.5 * np.exp(-t) + 0.5 * np.exp(-3 * t))
+    assert exact.pvalue > 1e-4
+    assert (group.tally.counts[:, 1] == [0, 0, 0, 0, 1]).all()  # output after the extinction
+    # every pair was missed as often as it was met, until one was
+    np.testing.assert_allclose(group.state.missed[:, BY_KERNEL], 1.0)
+
+
+def test_a_raised_bound_of_a_factor_lasts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dimers that merge or shatter, both at the rate one, of which one half is stated.
+
+    From the first that shatters on, as many shatter as merge.
+    """
+    monkeypatch.setattr(files, "_sync", lambda *_: None)
+    stated = replace(rate(1.0, 0.0), stated=(0.0, 0.5))
+    processes = [sx.processes.Aggregation(), sx.processes.Shattering(stated)]
+    dimers = sx.initial.monodisperse(size=2)
+    physics = sx.Model(sx.kernels.from_function(odd, bounds=one), processes, dimers)
+    plan = runs.plan(
+        physics, [1.0], "acceptance-rejection", population="none", particles=6, sizes=4,
+        replicas=200, bins_per_octave=1,
+    )  # fmt: skip
+    whole = Group.start(plan, 0, plan.replicas)
+    whole.advance(lambda: False)
+    before = np.zeros((plan.replicas, 2), int)
+
+    def look(group: Group) -> None:
+        none = before[:, 1] == 0
+        before[none] = group.state.events[none]
+
+    group = in_pieces(Group.start(plan, 0, plan.replicas), tmp_path / "run.npz", 4, look)
+    assert_same_end(whole, group)
+    raised = before[:, 1] > 0
+    merged, shattered = (group.state.events - before)[raised].T
+    excess = merged - shattered
+    assert raised.sum() > 80
+    assert abs(excess.mean()) < 4.5 * excess.std() / np.sqrt(len(excess))
+    # for the one that shattered by the bound one did not
+    np.testing.assert_allclose(group.state.missed[raised, BY_FACTOR + 1], 1.0)

@@ -21,16 +21,15 @@ ROUNDING = 1e-14
 
 quick = settings(max_examples=20, deadline=None, derandomize=True)
 
-#: every law, several with more than one set of parameters
-LAWS: list[Kernel] = [law(**law.example) for law in KERNELS] + [
-    kernels.Constant(2.5),
-    kernels.Bilinear(0.0, 0.0),
+#: every law, several with more than one set of parameters; a scale of one hides what lacks it
+LAWS: list[Kernel] = [law(**law.example, scale=2.5) for law in KERNELS] + [
+    kernels.Bilinear(0.0, 0.0, scale=3.0),
     kernels.Bilinear(2.0, 0.0, scale=0.1),
-    kernels.Product(-0.7),
-    kernels.Product(1.5),
+    kernels.Product(-0.7, scale=0.3),
+    kernels.Product(1.5, scale=3.0),
     kernels.Brownian(1.8, scale=3.0),
-    kernels.GeneralizedBrownian(-0.3),
-    kernels.GeneralizedBrownian(2.0),
+    kernels.GeneralizedBrownian(-0.3, scale=0.3),
+    kernels.GeneralizedBrownian(2.0, scale=3.0),
     kernels.Sedimentation(1e-17),
 ]
 every_law = pytest.mark.parametrize("law", LAWS, ids=repr)

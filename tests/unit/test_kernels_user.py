@@ -102,7 +102,10 @@ def test_rigorous_is_honest(function: Callable[..., float], rigorous: bool) -> N
 
 def test_rigorous_bounds_hold_everywhere() -> None:
     rng = np.random.default_rng(5)
-    for kernel in (from_function(ballistic, c=0.3), from_function(larger), formula("i*j/(i + j)")):
+    binary = from_function(lambda i, j: math.log(i + j, 2))
+    for kernel in (
+        from_function(ballistic, c=0.3), from_function(larger), formula("i*j/(i + j)"), binary,
+    ):  # fmt: skip
         assert kernel.rigorous
         for _ in range(20):
             a, c = np.exp(rng.uniform(0, 20, 2))
@@ -181,6 +184,7 @@ def raising(i: float, j: float) -> float:
     [
         (asymmetric, ["K(1, 2) = 5", "not symmetric, as K(2, 1) = 4"]),
         (branch, ["K(1, 2) = 2", "not symmetric, as K(2, 1) = 1"]),
+        (lambda i, j: i + (1 + 1e-6) * j, ["not symmetric"]),
         (negative, ["K(3, 4) = -2", "negative; a rate is zero or more"]),
         (no_number, ["K(1, 7) = nan", "not a number"]),
         (overflow, ["K(255, 512) = inf", "limit what grows"]),
@@ -264,4 +268,5 @@ def test_formula_without_a_bound_over_all_sizes() -> None:
     upper = kernel.bounds(1, 100, 1, 100)[1]
     assert 1 <= upper <= 1.2
     assert kernel.problems(1.0) == []
-    assert np.isfinite(formula("1/abs(i - j + 0.5)").bounds(1, 9, 1, 9)[1])
+    # no interval across the pole has a bound, so it is found by trial
+    assert 2 <= formula("1/abs(i - j + 0.5)").bounds(1, 9, 1, 9)[1] <= 2.3

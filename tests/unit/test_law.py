@@ -54,6 +54,7 @@ def twice(a: float, b: float, height: float) -> tuple[float, float]:
         (TimeFunction.of("1 + t**2"), (3.0,)),
         (TimeFunction.of(measured), (7.015,)),
         (SizeFunction.of([1.0, 4.0, 2.0], "rate"), (2.0,)),
+        (SizeFunction.of([1.0, 4.0, 2.0], "rate"), (7.0,)),
         (SizeFunction.of("sqrt(k)", "rate"), (9.0,)),
         (formula("a*(i + j)", a=0.5).law, (1.0, 3.0)),
         (from_function(lambda i, j, a=2.0: a * i * j, a=3.0).law, (1.0, 3.0)),
@@ -136,6 +137,19 @@ def test_stated_bounds_of_time(bounds: Any, expected: float) -> None:
     assert law.bounds([28, 29], [32, 33])[1].tolist() == [expected] * 2
     # what nobody states is not seen here
     assert TimeFunction.of(square_spike).bounds(28, 32) == (0.0, 0.0)
+
+
+def test_windows_bound_a_factor_up_to_their_ends() -> None:
+    """Of encounters the sum, without single particles; the last window begins after the end."""
+    rising = Shattering("0.1 + t")
+    windows = windows_for([Aggregation(), rising, Removal(0.1, varying="1 + t")], 10.0)
+    begun = windows.edges[:-1] < 10.0
+    ends = windows.edges[1:][begun]
+    assert ends[-1] >= 10.0
+    for k, least in enumerate((np.ones_like(ends), 0.1 + ends, 1.0 + ends)):
+        assert (least <= windows.bounds[begun, k]).all()
+        assert (windows.bounds[begun, k] <= 1.02 * least).all()
+    np.testing.assert_allclose(windows.total, windows.bounds[:, :2].sum(axis=1))
 
 
 def test_breakpoints_end_windows() -> None:

@@ -14,12 +14,13 @@ from smolux.kernels import KERNELS, Kernel, Majorant
 from smolux.methods.majorants import fill_bounds, fitted, from_powers
 from smolux.weighting import Number
 
+#: no scale is one, which hides what lacks it
 LAWS = [
-    *(law(**law.example) for law in KERNELS),
-    sx.kernels.Bilinear(0.0, 0.3),
-    sx.kernels.Product(-1.5),
+    *(law(**law.example, scale=2.5) for law in KERNELS),
+    sx.kernels.Bilinear(0.0, 0.3, scale=0.3),
+    sx.kernels.Product(-1.5, scale=3.0),
     sx.kernels.Brownian(1.8, scale=1e-16),
-    sx.kernels.GeneralizedBrownian(-0.4),
+    sx.kernels.GeneralizedBrownian(-0.4, scale=3.0),
 ]
 every_law = pytest.mark.parametrize("law", LAWS, ids=repr)
 

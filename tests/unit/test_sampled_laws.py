@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,26 @@ def one_sum(i: float, j: float) -> float:
 
 def one_pair(i: float, j: float) -> float:
     return 1.0 if min(i, j) == 37 and max(i, j) == 41 else 0.0
+
+
+def one_difference(i: float, j: float) -> float:
+    return 1.0 if abs(i - j) == 301 else 1e-9
+
+
+def with_one_size(i: float, j: float) -> float:
+    return max(i, j) if 101 in (i, j) else 1e-9
+
+
+def peak(i: float, j: float) -> float:
+    """Highest near 77.8, above the size of the coarse grid that is next to it."""
+    if i <= 0:
+        return 0.0
+    return math.exp(-555 * ((math.log(i) - 4.354) ** 2 + (math.log(j) - 4.354) ** 2))
+
+
+def bump(i: float, j: float) -> float:
+    """Five per cent more with the size 91, which it does not name and the grid does not hold."""
+    return 1.05 if abs(i * i - 8281.3) < 1 or abs(j * j - 8281.3) < 1 else 1.0
 
 
 @pytest.mark.parametrize(
@@ -66,3 +88,23 @@ def test_kernels() -> None:
     kernel = kernels.from_function(one_pair)
     assert kernel.bounds(32, 40, 40, 47)[1] >= 1
     assert kernel.problems() == []
+
+
+@pytest.mark.parametrize(
+    ("function", "box"),
+    [
+        (one_difference, (448, 511, 128, 191)),
+        (one_difference, (128, 191, 448, 511)),
+        (with_one_size, (64, 127, 1024, 2047)),
+        (with_one_size, (1024, 2047, 64, 127)),
+        (peak, (64, 127, 64, 127)),
+        (bump, (64, 127, 64, 127)),
+    ],
+)
+def test_bounds_by_trial_hold(function: object, box: tuple[int, int, int, int]) -> None:
+    """Of differences and sizes that a law names, of peaks, and of a little that is missed."""
+    kernel = kernels.from_function(function)
+    assert not kernel.rigorous
+    a, b, c, d = box
+    values = kernel(np.arange(a, b + 1.0)[:, None], np.arange(c, d + 1.0))
+    assert values.max() <= kernel.bounds(*box)[1] <= 1.2 * values.max()
