@@ -130,15 +130,25 @@ def timed() -> Iterator[Cell]:
                     yield cell
 
 
-def mixed() -> Iterator[Cell]:
-    """Yield every start with every process, and every pair of processes; the rest takes turns."""
-    for s in range(len(STARTS)):
+def each(starts: slice) -> Iterator[Cell]:
+    """Yield some of the starts with every process; kernels and what varies take turns."""
+    for s in range(len(STARTS))[starts]:
         for p, process in enumerate(PROCESSES):
             yield from _turned(s, p, (process,))
+
+
+def paired() -> Iterator[Cell]:
+    """Yield every pair of processes; starts, kernels and what varies take turns."""
     for p, pair in enumerate(combinations(PROCESSES, 2)):
         for s in (p % 16, (p + 7) % 16):
             # those that vary come first, now the one and now the other
             yield from _turned(s, p, pair[::-1] if (s + p) % 2 else pair)
+
+
+def mixed() -> Iterator[Cell]:
+    """Yield every start with every process, and every pair of processes."""
+    yield from each(slice(None))
+    yield from paired()
 
 
 def _turned(s: int, p: int, processes: tuple[Process, ...]) -> Iterator[Cell]:
