@@ -115,8 +115,8 @@ def total(values: dict[str, Any]) -> str:
     fast, slow = found.count("fast"), found.count("slow")
     share = fast / max(len(found), 1)
     return (
-        f"**In all, the fast tests see {fast} of {len(found)} mistakes ({share:.1%}), slow ones "
-        f"{slow} more; {found.count('none')} are seen by none. The goal is {GOAL:.0%}.**"
+        f"**Of {len(found)} mistakes that were tried the fast tests see {fast} ({share:.1%}), slow "
+        f"ones {slow} more, and none sees {found.count('none')}. The goal is {GOAL:.0%}.**"
     )
 
 
