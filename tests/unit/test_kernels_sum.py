@@ -186,6 +186,12 @@ def test_mistakes_in_a_case_file(old: str, new: str, words: str) -> None:
     assert words in str(caught.value)
 
 
+def test_a_sum_within_a_sum_needs_its_scales_too() -> None:
+    inner = '[[kernel.terms.terms]]\nname = "shear"\n'
+    with pytest.raises(InputError, match=r"kernel\.terms\[0\]\.terms\[0\]\.scale is missing"):
+        parse("[[kernel.terms]]\n" + inner + CASE[CASE.index("[initial]") :])
+
+
 @pytest.mark.parametrize("method", ["direct", "low-rank"])
 def test_the_rate_equations_of_a_sum(method: str) -> None:
     """A sum of a constant and an additive law has a closed form, and so has one with itself."""

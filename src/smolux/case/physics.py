@@ -328,8 +328,6 @@ def _require_units(data: Mapping[str, Any], problems: Problems) -> None:
     """In a case with units nothing may silently be 1 in SI units."""
     kernel, initial = data.get("kernel", {}), data.get("initial", {})
     _require_scale(kernel, ("kernel",), problems)
-    for n, term in enumerate(kernel.get("terms", ())):
-        _require_scale(term, ("kernel", "terms", n), problems)
     if initial.get("name") not in (Sizes.name, Empty.name) and "density" not in initial:
         problems.add(
             ("initial",),
@@ -339,6 +337,8 @@ def _require_units(data: Mapping[str, Any], problems: Problems) -> None:
 
 
 def _require_scale(kernel: Mapping[str, Any], path: Path, problems: Problems) -> None:
+    for n, term in enumerate(kernel.get("terms", ())):
+        _require_scale(term, (*path, "terms", n), problems)
     law = next((k for k in KERNELS if k.name == kernel.get("name")), None)
     if law is not None and "scale" in {f.name for f in fields(law)} and "scale" not in kernel:
         needed = [
