@@ -18,16 +18,16 @@ import numpy as np
 if __name__ == "__main__":
     sys.path[:0] = [str(Path(__file__).parent.parent / name) for name in ("", "spatial")]
 
+import runs
 from flights import run, system
 
 import smolux as sx
-from shared import FORMULA, VARYING
+from shared import VARYING
 from smolux.core.state import DOUBLINGS, EXTINCT, PENDING, TIME, TRIALS, VOLUME
-from smolux.plan import Plan, make_plan
+from smolux.plan import Plan
 from smolux.replicas import Group
 
 PATH = Path(__file__).parent / "data" / "golden.json"
-METHODS = [method.name for method in sx.methods.METHODS]
 P = sx.processes
 
 #: the kinds of processes, each with a loop that the tests of laws compile, too
@@ -52,14 +52,14 @@ WEIGHTINGS: dict[str, Any] = {
 }
 #: what is written without a loop of its own is compiled by the fast tests
 _FAST = {
-    *((m, "pairs", "number") for m in METHODS),
+    *((m, "pairs", "number") for m in runs.METHODS),
     *((m, "pairs in time", "number") for m in ("size-class", "acceptance-rejection")),
     *((m, "evaporating", "mass") for m in ("size-class", "acceptance-rejection")),
     *(("acceptance-rejection", "everything", w) for w in ("number", "power", "falling")),
 }
 _CASES = {
-    *((m, "everything", "number") for m in METHODS),
-    *((m, "evaporating", "mass") for m in METHODS),
+    *((m, "everything", "number") for m in runs.METHODS),
+    *((m, "evaporating", "mass") for m in runs.METHODS),
     *_FAST,
 }
 #: method, processes, weighting, policy, and whether the fast tests have the loop
@@ -77,11 +77,10 @@ FLIGHTS = {
 
 def plan(method: str, processes: str, weighting: str, policy: str) -> Plan:
     """Make the plan of a case: few particles at the start, so that stores grow."""
-    kernel = sx.kernels.formula(FORMULA, c0=1.0, c1=0.5, c2=0.0, c3=0.0)
-    start = sx.initial.from_sizes({1: 0.8, 3: 0.2})
-    model = sx.Model(kernel, PROCESSES[processes], start)
-    return make_plan(
-        model, [0.5, 2.0], method, WEIGHTINGS[weighting], policy, 60, 3, 5, (0, 1, 2), 40, 2, False
+    like = runs.model()
+    model = sx.Model(like.kernel, PROCESSES[processes], like.initial)
+    return runs.plan(
+        model, [0.5, 2.0], method, weighting=WEIGHTINGS[weighting], population=policy, particles=60
     )
 
 
