@@ -22,7 +22,8 @@ import numpy as np
 import smolux as sx
 from benchmarks.common import loop_seconds, model, table, write_section
 from smolux.core.state import TRIALS
-from smolux.plan import Plan, make_plan
+from smolux.plan import Plan
+from smolux.planning import make_plan
 from smolux.replicas import Group
 
 CLASSES, AR, LOW_RANK = "size-class", "acceptance-rejection", "low-rank"
@@ -58,16 +59,12 @@ class Case:
         return make_plan(
             physics,
             [self.end],
-            method,
-            "number",
-            "doubling",
-            self.particles,
-            8,
-            1,
-            (0, 1, 2, 3),
-            1024,
-            4,
-            False,
+            method=method,
+            particles=self.particles,
+            replicas=8,
+            seed=1,
+            orders=(0, 1, 2, 3),
+            sizes=1024,
         )
 
 

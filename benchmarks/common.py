@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import smolux as sx
-from smolux.plan import make_plan
+from smolux.planning import make_plan
 from smolux.replicas import Group
 
 RESULTS = Path(__file__).with_name("RESULTS.md")
@@ -33,7 +33,14 @@ def group_of(
 ) -> Group:
     """Prepare one replica, compiled, ready to run to one output time or through several."""
     plan = make_plan(
-        physics, end, method, "number", "doubling", particles, 1, seed, (0, 1, 2), 1024, 4, False
+        physics,
+        end,
+        method=method,
+        particles=particles,
+        replicas=1,
+        seed=seed,
+        orders=(0, 1, 2),
+        sizes=1024,
     )
     group = Group.start(plan, 0, 1)
     group.compile()

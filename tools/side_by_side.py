@@ -60,7 +60,7 @@ def argument_sets(count: int) -> list[dict[str, Any]]:
     choices: dict[str, list[Any]] = {
         "times": [[1.0], [0.0, 2.5], [2.0, 1.0], [], "soon", [float("nan")]],
         "method": ["auto", "inverse", "size-class", "low-rank", "best", None],
-        "weighting": ["number", "mass-flow", "auto", "weight-function", 3],
+        "weighting": ["number", "mass-flow", "weight-function", 3],
         "population": ["doubling", "fixed-volume", "none", "constant"],
         "particles": [2, 1000, 64_000, 1, -3, 10.0, "many"],
         "replicas": [1, 8, 0, 2.5],
@@ -86,19 +86,17 @@ def argument_sets(count: int) -> list[dict[str, Any]]:
 
 def plans() -> dict[str, str]:
     """Return what becomes of each set of arguments: the plan, or what is wrong with them."""
-    from dataclasses import fields
-
     import smolux as sx
-    from smolux.plan import make_plan
+    from smolux.planning import make_plan
 
     model = sx.Model(sx.kernels.Additive(), initial=sx.initial.from_sizes({2: 1.5, 7: 0.5}))
     found = {}
     for k, given in enumerate(argument_sets(SETS)):
         try:
             plan = make_plan(model, distribution=False, **given)
-            drawn = ("entropy",) if given["seed"] is None else ()
-            shown = {f.name: getattr(plan, f.name) for f in fields(plan) if f.name not in drawn}
-            text = f"{shown} {plan.volume!r} {plan.doubles_at}"
+            drawn = ("seed",) if given["seed"] is None else ()
+            shown = {name: getattr(plan, name) for name in given if name not in drawn}
+            text = f"{shown} {plan.reason} {plan.volume!r} {plan.doubles_at}"
         except sx.InputError as error:
             text = f"refused: {error}"
         found[f"arguments {k}: {given}"] = text

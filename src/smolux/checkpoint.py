@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +13,14 @@ import numpy as np
 
 from .content import frozen
 from .core.state import State, Tally, Windows
-from .errors import InputError, did_you_mean
+from .errors import InputError
 from .files import replacing
-from .goal import goal_from_dict
-from .methods import METHODS
 from .model import Model
 from .model_dict import model_from_dict, model_to_dict
 from .plan import Plan
 from .replicas import Group
+from .settings import Settings, from_plain, plain
 from .subvolumes import Divided, within
-from .weighting import WEIGHTINGS, Weighting
 
 #: what reading a file that is no checkpoint, or half of one, may raise
 _UNREADABLE = (
@@ -30,63 +28,26 @@ _UNREADABLE = (
 )  # fmt: skip
 
 #: raised whenever the content of a checkpoint changes
-VERSION = 4
-
-
-def _weighting_to_dict(weighting: Weighting) -> dict[str, Any]:
-    settings = asdict(weighting)  # type: ignore[call-overload]
-    if any(callable(value) for value in settings.values()):
-        raise InputError(
-            "the weight is a Python function, which no checkpoint holds; write it as a formula in "
-            "l, or as a power of the size"
-        )
-    return {"name": weighting.name, **settings}
+VERSION = 5
 
 
 def _plan_to_dict(plan: Plan) -> dict[str, Any]:
     return {
         "model": model_to_dict(plan.model),
-        "times": list(plan.times),
-        "method": {"name": plan.method.name, **asdict(plan.method)},  # type: ignore[call-overload]
-        "weighting": _weighting_to_dict(plan.weighting),
+        "asked": plain(Settings, plan.asked),
+        "decided": plain(Settings, plan),
         "reason": plan.reason,
         "weighting_reason": plan.weighting_reason,
-        "population": plan.population,
-        "particles": plan.particles,
-        "replicas": plan.replicas,
-        "entropy": str(plan.entropy),
-        "orders": list(plan.orders),
-        "sizes": plan.sizes,
-        "bins_per_octave": plan.bins_per_octave,
-        "distribution": plan.distribution,
-        "goal": None if plan.goal is None else asdict(plan.goal),
-        "subvolumes": plan.subvolumes,
-        "remix": plan.remix,
     }
 
 
-def named(given: dict[str, Any], registry: Sequence[Any], what: str) -> Any:
-    """Make a method or weighting from its name and settings."""
-    settings = dict(given)
-    name = settings.pop("name")
-    found = {entry.name: entry for entry in registry}
-    if name not in found:
-        raise InputError(f"{what} = {name!r}: unknown{did_you_mean(str(name), list(found))}")
-    return found[name](**settings)
-
-
 def _plan_from_dict(given: dict[str, Any], model: Model | None) -> Plan:
-    values = dict(given)
-    stored = values.pop("model")
     return Plan(
-        model=frozen(model) if model is not None else model_from_dict(stored),
-        times=tuple(values.pop("times")),
-        method=named(values.pop("method"), METHODS, "method"),
-        weighting=named(values.pop("weighting"), WEIGHTINGS, "weighting"),
-        entropy=int(values.pop("entropy")),
-        orders=tuple(values.pop("orders")),
-        goal=goal_from_dict(values.pop("goal", None)),
-        **values,
+        model=frozen(model) if model is not None else model_from_dict(given["model"]),
+        asked=Settings(**from_plain(Settings, given["asked"])),
+        reason=given["reason"],
+        weighting_reason=given["weighting_reason"],
+        **from_plain(Settings, given["decided"]),
     )
 
 

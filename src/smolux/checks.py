@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError
+from .errors import InputError, Problem
 
 
 def is_number(value: Any) -> bool:
@@ -55,29 +55,35 @@ def numbers(what: str, given: Any) -> NDArray[np.float64]:
     values = None if _has_unit(given) else _array(given)
     parts = values.ravel().tolist() if values is not None and values.dtype.kind == "O" else ()
     if values is None or any(_has_unit(part) for part in parts):
-        raise InputError(
-            f"{what} = {given!r}: has a unit; give plain numbers in the unit of the rates, such as "
-            f'{what}.to("s").magnitude for rates per second'
+        raise _wrong(
+            what,
+            "has a unit; give plain numbers in the unit of the rates, such as "
+            f'{what}.to("s").magnitude for rates per second',
+            given,
         )
     kind: str = values.dtype.kind
     if kind == "O":
         kind = next((k for k in map(_kind, parts) if k != "f"), "f")
     if kind == "m":
-        raise InputError(
-            f"{what} = {given!r}: is a duration; give plain numbers in the unit of the rates, such "
-            f'as {what} / np.timedelta64(1, "s") for rates per second'
+        raise _wrong(
+            what,
+            "is a duration; give plain numbers in the unit of the rates, such as "
+            f'{what} / np.timedelta64(1, "s") for rates per second',
+            given,
         )
     if kind == "M":
-        raise InputError(
-            f"{what} = {given!r}: is a date; give the time since the start as plain numbers, such "
-            f'as ({what} - start) / np.timedelta64(1, "s") for rates per second'
+        raise _wrong(
+            what,
+            "is a date; give the time since the start as plain numbers, such as "
+            f'({what} - start) / np.timedelta64(1, "s") for rates per second',
+            given,
         )
     if kind not in "iuf":
-        raise InputError(f"{what} = {given!r}: must be a list of numbers")
+        raise _wrong(what, "must be a list of numbers", given)
     return values.astype(float)
 
 
-def orders_of_moments(given: Any) -> NDArray[np.float64]:
+def orders_of_moments(given: Any, what: str = "orders") -> NDArray[np.float64]:
     """Return orders of moments as an array of floats.
 
     Raises
@@ -85,13 +91,17 @@ def orders_of_moments(given: Any) -> NDArray[np.float64]:
     InputError
         If they are no different finite numbers.
     """
-    found = np.atleast_1d(numbers("orders", given))
+    found = np.atleast_1d(numbers(what, given))
     alone = found.ndim == 1 and 0 < len(np.unique(found)) == found.size
     if not alone or not np.isfinite(found).all():
-        raise InputError(
-            f"orders = {given!r}: must be a list of different finite numbers, such as (0, 1, 2, 3)"
+        raise _wrong(
+            what, "must be a list of different finite numbers, such as (0, 1, 2, 3)", given
         )
     return found
+
+
+def _wrong(what: str, cure: str, given: Any) -> InputError:
+    return InputError([Problem(what, cure, given)])
 
 
 def _has_unit(value: Any) -> bool:

@@ -18,10 +18,11 @@ from .errors import InputError, Interrupted, OutOfMemoryError, WorkerError
 from .executors import completed
 from .goal import Trial, Verdict, judge, plan_replicas, shortfall
 from .observe import observable, to_records
-from .plan import PILOT, Plan, check_memory
+from .plan import Plan, check_memory
 from .progress import Progress
 from .replicas import Group
 from .results import to_dataset
+from .settings import PILOT, Control
 from .subvolumes import Divided, start
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ class Run:
         goal, done = self.plan.goal, self.plan.replicas
         if goal is None:
             return []
-        values, moved = observable(self.plan, self.groups)
+        values, moved = observable(self.plan, goal, self.groups)
         verdict = self.verdict = judge(goal, values, moved)
         if self.piloting:
             return self._after_pilots(plan_replicas(goal, values, moved))
@@ -153,18 +154,15 @@ class Threads(Run):
         self,
         plan: Plan,
         groups: list[Group | Divided],
-        executor: ThreadPoolExecutor | None,
-        progress: Callable[[Progress], None] | None,
-        checkpoint: Path | None,
-        checkpoint_every: float,
-        time_limit: float | None,
+        control: Control,
         workers: int,
         planned: float = 0.0,
         resumed: bool = False,
     ) -> None:
-        super().__init__(plan, groups, progress, workers, planned)
-        self.executor, self.checkpoint, self.every = executor, checkpoint, checkpoint_every
-        self.limit = np.inf if time_limit is None else time_limit
+        super().__init__(plan, groups, control.progress, workers, planned)
+        self.executor, self.checkpoint = control.executor, control.checkpoint
+        self.every = control.checkpoint_every
+        self.limit = np.inf if control.time_limit is None else control.time_limit
         self.saved = self.started
         self.unsaved = ""
         #: whether the file holds this run, be it at an earlier time

@@ -6,11 +6,49 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
+from typing import Any
 
 _EXHAUSTED = (
     "memory: there is no more: use fewer particles, replicas, sizes or output times, or let this "
     "process have more memory"
 )
+
+
+class Problem(str):
+    """What is wrong with one argument: a text that knows which, for those who know its place.
+
+    Parameters
+    ----------
+    key : str
+        The argument.
+    cure : str
+        What it must be.
+    *value : object
+        What was given, if that is to be shown.
+
+    Attributes
+    ----------
+    path : tuple of str or int
+        The keys that lead to the argument, the outermost first; it is the last.
+    cure : str
+    """
+
+    path: tuple[str | int, ...]
+    cure: str
+
+    def __new__(cls, key: str, cure: str, *value: Any) -> Problem:
+        """Put the text together."""
+        shown = "".join(f" = {v!r}" for v in value)
+        return cls._made(f"{key}{shown}: {cure}", (key,), cure)
+
+    @classmethod
+    def _made(cls, text: str, path: tuple[str | int, ...], cure: str) -> Problem:
+        self = super().__new__(cls, text)
+        self.path, self.cure = path, cure
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self)._made, (str(self), self.path, self.cure)
 
 
 class InputError(ValueError):

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .checks import whole
 from .confidence import Sample, enlarged, half_width
-from .errors import InputError, did_you_mean
+from .errors import Problem, did_you_mean
 
 Float = NDArray[np.float64]
 
@@ -166,77 +165,27 @@ def shortfall(goal: Goal, verdict: Verdict, replicas: int, time: float) -> str:
     )
 
 
-def make_goal(
-    target_error: Any,
+def named(
     target: Any,
-    max_replicas: Any,
-    replicas: Any,
     orders: Sequence[float],
     sizes: int,
     problems: list[str],
-) -> Goal | None:
-    """Check the arguments of `simulate` that make a goal; None if there is none.
-
-    What is wrong is added to `problems`.
-    """
-    name = _target(target, orders, sizes, problems)
-    most = whole(max_replicas)
-    if most is None or most < 1:
-        problems.append(f"max_replicas = {max_replicas!r}: must be a whole number of at least 1")
-    if target_error is None:
-        return None
-    number = isinstance(target_error, (int, float, np.number)) and target_error is not True
-    if not (number and 0 < target_error < 1):
-        problems.append(
-            f"target_error = {target_error!r}: must be a number between 0 and 1, the half width of "
-            "the 95 % interval over the mean, such as 0.001"
-        )
-    first = whole(replicas)
-    if first is not None and first < FEWEST:
-        problems.append(
-            f"replicas = {replicas!r}: with target_error at least {FEWEST}, with which the run "
-            "begins; fewer say too little of the scatter"
-        )
-    elif first is not None and most is not None and most < first:
-        problems.append(
-            f"max_replicas = {max_replicas!r}: must be at least replicas = {replicas!r}"
-        )
-    if problems or first is None or most is None:
-        return None
-    return Goal(name, float(target_error), first, most)
-
-
-def _target(target: Any, orders: Sequence[float], sizes: int, problems: list[str]) -> str:
-    """Return the name of an observable; note what is wrong with it."""
-    where = f"target = {target!r}"
+    key: str = "target",
+) -> str:
+    """Return the name of an observable; add what is wrong with it to `problems`."""
     name = target if isinstance(target, str) else ""
     if name in ("number_density", "largest"):
         return name
     if re.fullmatch(r"M-?\d+(\.\d+)?", name):
-        if float(name[1:]) not in orders:
-            listed = ", ".join(f"{p:g}" for p in orders)
-            problems.append(f"{where}: this moment is not computed; orders has {listed}")
+        if float(name[1:]) in orders:
+            return name
+        listed = ", ".join(f"{p:g}" for p in orders)
+        cure = f"this moment is not computed; orders has {listed}"
     elif re.fullmatch(r"n_\d+", name):
-        if not 1 <= int(name[2:]) <= sizes:
-            problems.append(f"{where}: sizes = {sizes} is the last that is counted by itself")
+        if 1 <= int(name[2:]) <= sizes:
+            return name
+        cure = f"sizes = {sizes} is the last that is counted by itself"
     else:
-        problems.append(
-            f"{where}: unknown{did_you_mean(name, TARGETS)} (any order in M2, any size in n_5)"
-        )
+        cure = f"is unknown{did_you_mean(name, TARGETS)} (any order in M2, any size in n_5)"
+    problems.append(Problem(key, cure, target))
     return name
-
-
-def goal_from_dict(given: dict[str, Any] | None) -> Goal | None:
-    """Make a goal from what a checkpoint holds.
-
-    Raises
-    ------
-    InputError
-        If it is none.
-    """
-    if given is None:
-        return None
-    try:
-        return Goal(**given)
-    except TypeError as error:
-        raise InputError(f"goal: {error}") from None

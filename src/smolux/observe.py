@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .core.state import DOUBLINGS, EXTINCT
+from .goal import Goal
 from .plan import Plan
 from .records import Records
 from .replicas import Group
@@ -80,8 +81,10 @@ def _number_density(
     return np.asarray(np.concatenate(stood) / volume)
 
 
-def observable(plan: Plan, groups: Sequence[Group | Divided]) -> tuple[Float, NDArray[np.bool_]]:
-    """Return what the goal of a plan is about, at all output times of replicas that are done.
+def observable(
+    plan: Plan, goal: Goal, groups: Sequence[Group | Divided]
+) -> tuple[Float, NDArray[np.bool_]]:
+    """Return what a goal is about, at all output times of replicas that are done.
 
     Returns
     -------
@@ -89,19 +92,18 @@ def observable(plan: Plan, groups: Sequence[Group | Divided]) -> tuple[Float, ND
     moved : ndarray of bool, shape (T,)
         Whether anything has happened in any replica.
     """
-    assert plan.goal is not None
     scalars = np.concatenate([g.tally.scalars for g in groups])
     _, particles, collisions, volume, largest, come, gone = np.moveaxis(scalars, -1, 0)
     values = _number_density(plan, groups, particles, volume)
-    if plan.goal.target == "largest":
+    if goal.target == "largest":
         values = largest
-    elif plan.goal.size is not None:
-        count = np.concatenate([g.tally.counts[:, :, plan.goal.size] for g in groups])
-        values = count * plan.weighting.stands_for(np.array([float(plan.goal.size)])) / volume
-    elif plan.goal.order is not None:
+    elif goal.size is not None:
+        count = np.concatenate([g.tally.counts[:, :, goal.size] for g in groups])
+        values = count * plan.weighting.stands_for(np.array([float(goal.size)])) / volume
+    elif goal.order is not None:
         sizes = np.arange(1, plan.sizes + 1, dtype=float)
-        powers = sizes**plan.goal.order * plan.weighting.stands_for(sizes)
-        column = plan.orders.index(plan.goal.order)
+        powers = sizes**goal.order * plan.weighting.stands_for(sizes)
+        column = plan.orders.index(goal.order)
         sums = [g.tally.counts[:, :, 1:] @ powers + g.tally.sums[..., column] for g in groups]
         values = np.concatenate(sums) / volume
     events = np.concatenate([g.tally.events for g in groups])
@@ -122,7 +124,7 @@ def _attributes(plan: Plan, groups: Sequence[Group | Divided]) -> dict[str, obje
         "population": plan.population,
         "initial_particles": plan.particles,
         "subvolumes": plan.subvolumes,
-        "seed": str(plan.entropy),
+        "seed": str(plan.seed),
         "doublings": int(max(g.state.count[:, DOUBLINGS].max() for g in groups)),
         "events": sum(g.events for g in groups),
         "compute_seconds": sum(g.seconds for g in groups),

@@ -16,13 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .core.state import EVENTS, TRIALS
+from .costing import event_cost
 from .goal import Goal
 from .methods import SizeClass
+from .model import Model
 from .observe import observable
-from .plan import Plan, check_memory, event_cost, with_method
+from .plan import Plan
 from .replicas import Group
+from .settings import Settings
 from .weighting import MassFlow, Number, WeightFunction
-from .weighting.auto import Auto
 from .weighting.base import Weighting
 
 Float = NDArray[np.float64]
@@ -65,20 +67,16 @@ class _Trial:
     cost: float
 
 
-def settled(plan: Plan) -> Plan:
-    """Replace a weighting that is still to be chosen; a plan with another is returned as it is."""
-    if not isinstance(plan.weighting, Auto):
-        return plan
-    goal = Goal(plan.weighting.target, 0.5, 2, 2)
-    trials = list(_trials(plan, goal))
+def chosen_weighting(model: Model, settings: Settings) -> tuple[Weighting, str]:
+    """Return the weighting that is worth most for the target, and why.
+
+    The model is frozen, and the settings have a seed.
+    """
+    goal = Goal(settings.target, 0.5, 2, 2)
+    trials = list(_trials(model, settings, goal))
     if len(trials) == len(_POWERS):
-        weighting, reason = _compared(goal, trials)
-    else:
-        weighting, reason = _by_rule(plan, goal)
-    chosen = replace(plan, weighting=weighting, weighting_reason=reason)
-    chosen = with_method(chosen) if plan.reason else chosen
-    check_memory(chosen)
-    return chosen
+        return _compared(goal, trials)
+    return _by_rule(model, goal)
 
 
 def named(power: float) -> Weighting:
@@ -86,34 +84,37 @@ def named(power: float) -> Weighting:
     return {0.0: Number(), 1.0: MassFlow()}.get(power) or WeightFunction(power)
 
 
-def _trials(plan: Plan, goal: Goal) -> Iterator[_Trial]:
+def _trials(model: Model, settings: Settings, goal: Goal) -> Iterator[_Trial]:
     """Run the pilots, as long as they come to their ends."""
-    seeds = np.random.SeedSequence(plan.entropy, spawn_key=(0, _STREAM)).generate_state(
+    seeds = np.random.SeedSequence(settings.seed, spawn_key=(0, _STREAM)).generate_state(
         len(_POWERS), np.uint64
     )
-    some = np.linspace(0, len(plan.times) - 1, min(len(plan.times), _TIMES)).astype(int)
+    times = settings.times
+    some = np.linspace(0, len(times) - 1, min(len(times), _TIMES)).astype(int)
     small = replace(
-        plan,
-        method=SizeClass(),
-        particles=min(plan.particles, _PARTICLES),
-        times=tuple(plan.times[k] for k in some),
+        settings,
+        particles=min(settings.particles, _PARTICLES),
+        times=tuple(times[k] for k in some),
         orders=(goal.order or 0.0,),
-        sizes=max(goal.size or 1, min(plan.sizes, _SIZES)),
+        sizes=max(goal.size or 1, min(settings.sizes, _SIZES)),
         bins_per_octave=1,
         distribution=False,
-        goal=goal,
         subvolumes=1,
     )
     for power, seed in zip(_POWERS, seeds.tolist(), strict=True):
         # one compiled loop for all: the power is data
-        given = replace(small, weighting=WeightFunction(power), entropy=seed)
-        trial = _trial(plan, given, named(power))
+        given = Plan.of(
+            model, small, method=SizeClass(), weighting=WeightFunction(power), seed=seed
+        )
+        # in the run itself
+        meant = Plan.of(model, settings, method=SizeClass(), weighting=named(power))
+        trial = _trial(given, goal, meant)
         if trial is None:
             return
         yield trial
 
 
-def _trial(plan: Plan, small: Plan, weighting: Weighting) -> _Trial | None:
+def _trial(small: Plan, goal: Goal, meant: Plan) -> _Trial | None:
     """Run one pilot; None if it takes too long."""
     values, present, events, effort = [], [], 0, 0
     together = max(1, min(_TOGETHER, _OBSERVED // (len(small.times) * small.sizes)))
@@ -124,16 +125,16 @@ def _trial(plan: Plan, small: Plan, weighting: Weighting) -> _Trial | None:
         # that it came to its end in the last slice says something of the machine, and is left out
         if _effort(group) > _EFFORT:
             return None
-        values.append(observable(small, [group])[0])
+        values.append(observable(small, goal, [group])[0])
         present.append(group.tally.scalars[..., 3])
         events += int(group.state.events.sum())
         if effort > _EFFORT // 2:
             break
-    assert small.goal is not None
-    if small.goal.size is not None:
-        weight = weighting.weights(np.array([float(small.goal.size)]))[0]
+    weighting = meant.weighting
+    if goal.size is not None:
+        weight = weighting.weights(np.array([float(goal.size)]))[0]
         present = [weight * volume for volume in present]
-    cost = events / (together * len(values)) * event_cost(replace(plan, weighting=weighting))
+    cost = events / (together * len(values)) * event_cost(meant)
     cost *= _POWER_COST if isinstance(weighting, WeightFunction) else 1.0
     return _Trial(weighting, np.concatenate(values), np.concatenate(present), cost)
 
@@ -191,9 +192,9 @@ def _label(weighting: Weighting) -> str:
     return weighting.name
 
 
-def _by_rule(plan: Plan, goal: Goal) -> tuple[Weighting, str]:
+def _by_rule(model: Model, goal: Goal) -> tuple[Weighting, str]:
     """Choose by the name of the observable alone."""
-    sizes, counts = plan.model.initial.sample(1000, 0.5) if plan.model.initial.total else (1, 1)
+    sizes, counts = model.initial.sample(1000, 0.5) if model.initial.total else (1, 1)
     mean = float(np.sum(sizes * counts) / np.sum(counts))
     large = (goal.order or 0.0) > 1.0 or (goal.size or 0.0) > mean
     return (MassFlow() if large else Number()), (

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import room
-from .assembly import bound_splits, factor_parameters, loop_for, rates_for, uncompilable
+from .assembly import bound_splits, factor_parameters, uncompilable
 from .core.compile import CompileError
 from .core.rng import streams
 from .core.state import (
@@ -57,7 +57,6 @@ from .model import Model
 from .plan import Plan
 from .processes.base import LoneProcess
 from .remembered import spent
-from .windows import windows_for
 
 Int = NDArray[np.int64]
 
@@ -81,7 +80,7 @@ class Group:
     compile_seconds: float = 0.0
     #: for bounds and tables of rates, not part of `seconds`
     bounds_seconds: float = 0.0
-    #: what `loop_for` returns for the plan, once it is known: what tells loops apart takes time
+    #: that of the plan, once it is known: what tells loops apart takes time
     loop: Any = None
     #: parameters of the processes, with tables that fill up as sizes occur
     parameters: Parameters | None = None
@@ -96,11 +95,9 @@ class Group:
         """
         before = spent()
         populations = initial_populations(plan, range(first, first + count))
-        state = empty_state(plan, streams(plan.entropy, first, count))
-        rates = rates_for(plan.model, plan.weighting)
-        work = plan.method.new_work(rates, populations, state, plan.mass)
-        windows = windows_for(plan.model.processes, plan.times[-1], plan.weighting)
-        new = cls.of(plan, first, state, work, windows, loop)
+        state = empty_state(plan, streams(plan.seed, first, count))
+        work = plan.method.new_work(plan.rates, populations, state, plan.mass)
+        new = cls.of(plan, first, state, work, plan.windows(), loop)
         new.bounds_seconds = spent() - before
         return new
 
@@ -136,8 +133,7 @@ class Group:
     def unbegun(cls, plan: Plan, first: int, count: int) -> Group:
         """Return a group of which nothing is known, in place of one that never came back."""
         state = empty_state(plan, np.zeros((count, 4), np.uint64))
-        windows = windows_for(plan.model.processes, plan.times[-1], plan.weighting)
-        return cls.of(plan, first, state, None, windows)
+        return cls.of(plan, first, state, None, plan.windows())
 
     @property
     def done(self) -> bool:
@@ -174,7 +170,7 @@ class Group:
 
     def _call(self, codes: Int, budget: int) -> None:
         plan = self.plan
-        self.loop = self.loop or loop_for(plan.model, plan.method, plan.weighting)
+        self.loop = self.loop or plan.loop
         self.parameters = self.parameters or factor_parameters(plan.model.processes)
         self.loop(
             self.state,
@@ -249,8 +245,7 @@ class Group:
         # whatever comes of it, it is asked for anew; but not a population, or it would come twice
         self.codes[r] = BUDGET
         if code == BOUND:
-            rates = rates_for(plan.model, plan.weighting)
-            plan.method.supply_bound(self.work, rates, self.state, r)
+            plan.method.supply_bound(self.work, plan.rates, self.state, r)
         elif code == SPLITS:
             assert self.parameters is not None
             bound_splits(plan.model.processes, self.parameters, int(self.state.count[r, WANTED]))
@@ -314,7 +309,7 @@ def initial_populations(plan: Plan, replicas: Sequence[int]) -> list[tuple[Int, 
     initial = plan.start
     if isinstance(initial, Sizes) and len(initial.sizes) == 1:  # nothing to draw
         return [(np.array(initial.sizes), np.array([plan.particles]))] * len(replicas)
-    sequences = (np.random.SeedSequence(plan.entropy, spawn_key=(r, 1)) for r in replicas)
+    sequences = (np.random.SeedSequence(plan.seed, spawn_key=(r, 1)) for r in replicas)
     draws = (float(np.random.default_rng(sequence).random()) for sequence in sequences)
     return [initial.sample(plan.particles, u) for u in draws]
 

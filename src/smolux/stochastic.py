@@ -5,24 +5,25 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
 from . import checkpoint as checkpoints
-from .checks import is_number
+from .content import frozen
 from .driving import Elsewhere, Threads
 from .errors import InputError
 from .executors import adapted, workers_of
 from .methods.base import Method
 from .model import Model
-from .pilot import settled
-from .plan import make_plan
+from .planning import checked, decided
 from .progress import Progress
 from .remembered import spent
 from .resources import cores
 from .results import told
+from .settings import Control
 from .subvolumes import start
 from .weighting.base import Weighting
 
@@ -160,28 +161,23 @@ def simulate(
     >>> float(ds["moment"].sel(order=1).mean())
     1.0
     """
-    executor, before = adapted(executor), spent()
-    problems = _control_problems(executor, progress, checkpoint, checkpoint_every, time_limit)
+    given = dict(locals())
+    before = spent()
+    control, problems = _controlled(given)
     try:
-        plan = make_plan(
-            model, times, method, weighting, population, particles, replicas, seed, orders, sizes,
-            bins_per_octave, distribution, target_error, target, max_replicas, subvolumes, remix,
-        )  # fmt: skip
+        settings = checked(given.pop("model"), given)
     except InputError as error:
         raise InputError([*error.problems, *problems]) from None
     if problems:
         raise InputError(problems)
-    plan = settled(plan)
+    plan = decided(frozen(model), settings)
     planned = spent() - before
-    if executor is not None and not isinstance(executor, ThreadPoolExecutor):
-        return told(Elsewhere(plan, executor, progress, workers_of(executor), planned).finish())
+    other = control.executor
+    if other is not None and not isinstance(other, ThreadPoolExecutor):
+        return told(Elsewhere(plan, other, control.progress, workers_of(other), planned).finish())
     workers = max(1, cores() // plan.subvolumes)
     groups = [start(plan, *part) for part in plan.begin(workers)]
-    file = None if checkpoint is None else Path(checkpoint).expanduser()
-    run = Threads(
-        plan, groups, executor, progress, file, checkpoint_every, time_limit, workers, planned
-    )
-    return told(run.finish())
+    return told(Threads(plan, groups, control, workers, planned).finish())
 
 
 def resume(
@@ -213,52 +209,16 @@ def resume(
     InputError, Interrupted
         As `simulate`, and if the file cannot be read.
     """
-    problems = _control_problems(executor, progress, checkpoint, checkpoint_every, time_limit)
+    given = dict(locals())
+    control, problems = _controlled(given | {"checkpoint": None})
     if problems:
         raise InputError(problems)
     file = Path(checkpoint).expanduser()
-    plan, groups = checkpoints.load(file, model)
+    control, (plan, groups) = replace(control, checkpoint=file), checkpoints.load(file, model)
     workers = max(1, cores() // plan.subvolumes)
-    run = Threads(
-        plan, groups, executor, progress, file, checkpoint_every, time_limit, workers,
-        resumed=True,
-    )  # fmt: skip
-    return told(run.finish())
+    return told(Threads(plan, groups, control, workers, resumed=True).finish())
 
 
-def _control_problems(
-    executor: Any, progress: Any, checkpoint: Any, checkpoint_every: Any, time_limit: Any
-) -> list[str]:
-    """Return what is wrong with the arguments that decide how a run is driven, not its outcome."""
-    problems = []
-    if executor is not None and not callable(getattr(executor, "submit", None)):
-        problems.append(
-            f"executor = {executor!r}: must be a concurrent.futures.Executor, or None for threads"
-        )
-    elif executor is not None and not isinstance(executor, ThreadPoolExecutor):
-        problems += [
-            f"{name} = {value!r}: is only for runs on threads of this process; "
-            "leave it out, or leave out the executor"
-            for name, value in (("checkpoint", checkpoint), ("time_limit", time_limit))
-            if value is not None
-        ]
-    if progress is not None and not callable(progress):
-        problems.append(f"progress = {progress!r}: must be a function that takes a Progress")
-    if checkpoint is not None:
-        problems += _path_problems(checkpoint)
-    for name, value in (("checkpoint_every", checkpoint_every), ("time_limit", time_limit)):
-        if not (is_number(value) and value > 0) and (name, value) != ("time_limit", None):
-            problems.append(f"{name} = {value!r}: must be a positive number of seconds")
-    return problems
-
-
-def _path_problems(checkpoint: Any) -> list[str]:
-    where = f"checkpoint = {checkpoint!r}"
-    if not isinstance(checkpoint, (str, os.PathLike)):
-        return [f"{where}: must be the path of a file"]
-    path = Path(checkpoint).expanduser()
-    if path.is_dir():
-        return [f"{where}: is a folder; name a file in it"]
-    if not path.absolute().parent.is_dir():
-        return [f"{where}: there is no folder {str(path.parent)!r}; create it first"]
-    return []
+def _controlled(given: dict[str, Any]) -> tuple[Control, list[str]]:
+    """Return those of the arguments that drive a run, and what is wrong with them."""
+    return Control.checked(given | {"executor": adapted(given["executor"])})

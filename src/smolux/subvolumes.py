@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import room
-from .assembly import rates_for
 from .core.rng import stream
 from .core.state import (
     BUDGET,
@@ -46,9 +45,10 @@ from .core.state import (
     new_tally,
 )
 from .methods.base import merged, size_of
-from .plan import LEAST, Plan
+from .plan import Plan
 from .processes.base import PairProcess
 from .replicas import Group, empty_state, initial_populations
+from .settings.simulation import LEAST
 
 Int = NDArray[np.int64]
 
@@ -170,17 +170,17 @@ class Divided:
         size = sum(copies * size_of(part.work) for part in self.parts)
         what = f"the sub-volumes of replica {self.first}, dealt out anew at t = {start:.6g},"
         used = max(1, min(self.plan.subvolumes, copies * int(count[PARTICLES]) // LEAST))
-        method, rates = plan.method, rates_for(plan.model, plan.weighting)
+        method, rates = plan.method, self.plan.rates
         learnt = [method.learnt(part.work, part.state) for part in self.parts]
         window = int(np.searchsorted(self.windows.edges, start, side="right")) - 1
         loop, parameters = self.parts[0].loop, [part.parameters for part in self.parts]
 
         def split(k: int) -> list[Any]:
-            part, words = self.parts[k], stream(plan.entropy, self.first, _MIXING, self.stretch, k)
+            part, words = self.parts[k], stream(plan.seed, self.first, _MIXING, self.stretch, k)
             return method.split(part.work, part.state, used, copies, words)
 
         def fill(k: int) -> Group:
-            words = stream(plan.entropy, self.first, _PART, self.stretch, k)
+            words = stream(plan.seed, self.first, _PART, self.stretch, k)
             state = empty_state(plan, words[None])
             work = method.collect(rates, [given[k] for given in piles], state, plan.mass)
             state.clock[0, (TIME, VOLUME, FLOOR)] = start, clock[VOLUME] / used, clock[FLOOR]
@@ -269,13 +269,13 @@ def within(plan: Plan, times: tuple[float, ...]) -> Plan:
 
 def _first_stretch(plan: Plan, replica: int) -> float:
     """Estimate how long it takes until the share of particles has collided after which to mix."""
-    rng = np.random.default_rng(np.random.SeedSequence(plan.entropy, spawn_key=(replica, _GUESS)))
+    rng = np.random.default_rng(np.random.SeedSequence(plan.seed, spawn_key=(replica, _GUESS)))
     sizes, counts = initial_populations(plan, [replica])[0]
     if not counts.any():
         return 1e-3 * plan.times[-1]
     i, j = rng.choice(sizes, (2, 1000), p=counts / counts.sum()).astype(float)
     with np.errstate(all="ignore"):
-        mean = float(np.mean(rates_for(plan.model, plan.weighting).arrays(i, j)))
+        mean = float(np.mean(plan.rates.arrays(i, j)))
     factors = sum(
         float(process.factor(0.0))
         for process in plan.model.processes

@@ -15,7 +15,7 @@ from smolux import exact
 from smolux.core.state import TRIALS
 from smolux.kernels import Kernel, Majorant
 from smolux.kernels.formula_kernel import FormulaKernel
-from smolux.plan import make_plan
+from smolux.planning import make_plan
 from smolux.replicas import Group
 
 pytestmark = extinction
@@ -80,9 +80,15 @@ def test_laws_that_bring_their_majorant(shattering: float) -> None:
 def _group(kernel: Kernel, method: Any, particles: int, end: float, replicas: int = 1) -> Group:
     model = sx.Model(kernel, [sx.processes.Aggregation(), sx.processes.Shattering(0.01)])
     plan = make_plan(
-        model, [0.5 * end, end], method, "number", "doubling", particles, replicas, 5, (0, 1), 64,
-        4, False,
-    )  # fmt: skip
+        model,
+        [0.5 * end, end],
+        method=method,
+        particles=particles,
+        replicas=replicas,
+        seed=5,
+        orders=(0, 1),
+        sizes=64,
+    )
     return Group.start(plan, 0, replicas)
 
 

@@ -305,8 +305,16 @@ def test_choice_of_a_method() -> None:
     """The estimate of the cost is that of the weighted rates."""
     model = sx.Model(sx.kernels.Constant(), initial=sx.initial.monodisperse(2.0))
     found = {
-        name: sx.plan.make_plan(
-            model, [20.0], "auto", name, "doubling", 100_000, 1, 1, (0,), 8, 4, False
+        name: sx.planning.make_plan(
+            model,
+            [20.0],
+            method="auto",
+            weighting=name,
+            particles=100_000,
+            replicas=1,
+            seed=1,
+            orders=(0,),
+            sizes=8,
         )
         for name in ("number", "mass-flow")
     }

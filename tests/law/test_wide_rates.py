@@ -13,7 +13,7 @@ import smolux as sx
 from shared import extinction, laborious
 from smolux.core.state import TRIALS
 from smolux.methods import METHODS
-from smolux.plan import make_plan
+from smolux.planning import make_plan
 from smolux.replicas import Group
 
 pytestmark = [extinction, laborious]
@@ -77,9 +77,16 @@ def test_a_lone_particle_does_not_meet_itself(
 
 def _all_merge(kernel: Any, particles: int, method: str, most: int) -> None:
     plan = make_plan(
-        sx.Model(kernel), [1e9], method, "number", "fixed-volume", particles, 1, 1, (0, 1), 64,
-        4, False,
-    )  # fmt: skip
+        sx.Model(kernel),
+        [1e9],
+        method=method,
+        population="fixed-volume",
+        particles=particles,
+        replicas=1,
+        seed=1,
+        orders=(0, 1),
+        sizes=64,
+    )
     group = Group.start(plan, 0, 1)
     group.advance(lambda: int(group.state.count[0, TRIALS]) > 2 * most)
     assert group.events == particles - 1

@@ -11,7 +11,8 @@ import pytest
 import smolux as sx
 from shared import FORMULA, QUICK, VARYING
 from smolux import checkpoint as checkpoints
-from smolux.plan import Plan, make_plan
+from smolux.plan import Plan
+from smolux.planning import make_plan
 from smolux.replicas import Group
 
 METHODS = [method.name for method in sx.methods.METHODS]
@@ -38,7 +39,7 @@ def plan(model: sx.Model, times: Any, method: str, **settings: Any) -> Plan:
         "weighting": "number", "population": "doubling", "particles": 150, "replicas": 3,
         "seed": 5, "orders": (0, 1, 2), "sizes": 40, "bins_per_octave": 2, "distribution": False,
     } | settings  # fmt: skip
-    return make_plan(model, times, method, **given)
+    return make_plan(model, times, method=method, **given)
 
 
 def written(group: Group, path: Path) -> Group:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import smolux as sx
-from smolux import plan
+from smolux import plan, planning
 from smolux.errors import InputError
 
 MODEL = sx.Model(sx.kernels.Constant())
@@ -101,19 +101,40 @@ def test_memory_is_refused_before_anything_is_computed(monkeypatch: pytest.Monke
     assert "sizes = 10000000" in message
     # what cannot be known is no obstacle
     monkeypatch.setattr(plan, "available_memory", lambda: None)
-    assert plan.check_memory(plan.make_plan(
-        MODEL, [1.0], "inverse", "number", "none", 10, 1, 1, (0,), 10**9, 4, False,
-    )) is None  # fmt: skip
+    assert (
+        plan.check_memory(
+            planning.make_plan(
+                MODEL,
+                [1.0],
+                method="inverse",
+                population="none",
+                particles=10,
+                replicas=1,
+                seed=1,
+                orders=(0,),
+                sizes=10**8,
+            )
+        )
+        is None
+    )
 
 
 def test_what_is_accepted() -> None:
     given: dict[str, Any] = {"weighting": "number", "population": "none", "seed": 2**200}
-    made = plan.make_plan(
-        MODEL, 2, sx.methods.METHODS[0](), particles=np.int64(10), replicas=2.0,  # type: ignore[arg-type]
-        orders=np.array([0, 0.5]), sizes=5, bins_per_octave=1, distribution=False, **given,
-    )  # fmt: skip
+    made = planning.make_plan(
+        MODEL,
+        2,
+        method=sx.methods.METHODS[0](),
+        particles=np.int64(10),
+        replicas=2.0,
+        orders=np.array([0, 0.5]),
+        sizes=5,
+        bins_per_octave=1,
+        distribution=False,
+        **given,
+    )
     assert made.times == (2.0,)
-    assert (made.particles, made.replicas, made.entropy) == (10, 2, 2**200)
+    assert (made.particles, made.replicas, made.seed) == (10, 2, 2**200)
     assert made.orders == (0.0, 0.5)
 
 

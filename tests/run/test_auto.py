@@ -30,7 +30,7 @@ def test_a_constant_kernel_is_never_rejected() -> None:
     [("ballistic", 20_000, 20.0), ("additive", 5_000, 1.0)],
 )
 def test_the_estimate_is_near_what_a_run_needs(law: str, particles: int, end: float) -> None:
-    from smolux.plan import make_plan
+    from smolux.planning import make_plan
     from smolux.replicas import Group
 
     given = {"c0": 0.0, "c1": 0.0, "c2": 0.0, "c3": 0.0}
@@ -39,9 +39,15 @@ def test_the_estimate_is_near_what_a_run_needs(law: str, particles: int, end: fl
     )
     processes = [sx.processes.Aggregation(), sx.processes.Shattering(0.0)]
     plan = make_plan(
-        sx.Model(kernel, processes), [end], "acceptance-rejection", "number", "doubling",
-        particles, 2, 1, (0,), 16, 4, False,
-    )  # fmt: skip
+        sx.Model(kernel, processes),
+        [end],
+        method="acceptance-rejection",
+        particles=particles,
+        replicas=2,
+        seed=1,
+        orders=(0,),
+        sizes=16,
+    )
     group = Group.start(plan, 0, 2)
     group.advance(lambda: False)
     from smolux.core.state import EVENTS, TRIALS

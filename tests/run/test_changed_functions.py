@@ -17,7 +17,7 @@ from smolux import processes
 from smolux.content import digest, frozen, is_frozen
 from smolux.core.compile import user_piece
 from smolux.deterministic.splitting import Splits
-from smolux.plan import make_plan
+from smolux.planning import make_plan
 from smolux.windows import windows_for
 
 slow = pytest.mark.slow
@@ -178,7 +178,9 @@ def test_bounds_in_time_are_those_of_now(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def planned(model: sx.Model) -> Any:
-    return make_plan(model, [1.0], "inverse", "number", "doubling", 100, 2, 1, (0, 1), 8, 4, False)
+    return make_plan(
+        model, [1.0], method="inverse", particles=100, replicas=2, seed=1, orders=(0, 1), sizes=8
+    )
 
 
 def test_the_solver_sees_the_change(monkeypatch: pytest.MonkeyPatch) -> None:

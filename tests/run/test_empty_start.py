@@ -10,7 +10,8 @@ import pytest
 import smolux as sx
 from smolux import processes
 from smolux.cli.estimate import Pilot
-from smolux.plan import Plan, make_plan
+from smolux.plan import Plan
+from smolux.planning import make_plan
 from smolux.windows import windows_for
 
 
@@ -20,9 +21,17 @@ def planned(
     kinds = [processes.Aggregation(), processes.Source({1: 1.5, 2: 0.5}, varying=varying)]
     model = sx.Model(sx.kernels.Constant(), kinds, sx.initial.empty())
     return make_plan(
-        model, times or [end], "size-class", weighting, "doubling", 2000, 1, 1, (0, 1), 8, 4, False,
+        model,
+        times or [end],
+        method="size-class",
+        weighting=weighting,
+        particles=2000,
+        replicas=1,
+        seed=1,
+        orders=(0, 1),
+        sizes=8,
         subvolumes=parts,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(

@@ -17,12 +17,13 @@ from scipy import stats
 import smolux as sx
 from shared import FORMULA, extinction
 from smolux.ensembles import Moments
-from smolux.ensembles.batches import Batch, Sampler, _goal, make_sampler
+from smolux.ensembles.batches import Batch, Sampler, make_sampler
 from smolux.ensembles.efficiency import _compared, _reference
 from smolux.ensembles.ensemble import Collected
 from smolux.errors import InputError
 from smolux.exact import finite
-from smolux.plan import make_plan
+from smolux.goal import Goal
+from smolux.planning import make_plan
 
 METHOD = "acceptance-rejection"
 MODEL = sx.Model(kernel=sx.kernels.Constant())
@@ -226,8 +227,19 @@ def test_intervals_of_efficiencies_hold_the_scatter_of_variances():
     ],
 )
 def test_the_bias_is_against_the_solution(kernel: Any, t: float, expected: Any):
-    plan = make_plan(sx.Model(kernel), [t], METHOD, "number", "none", 20, 1, 1, (0, 2), 8, 1, False)
-    goals = [_goal(name, plan.orders, plan.sizes, []) for name in NAMES]
+    plan = make_plan(
+        sx.Model(kernel),
+        [t],
+        method=METHOD,
+        population="none",
+        particles=20,
+        replicas=1,
+        seed=1,
+        orders=(0, 2),
+        sizes=8,
+        bins_per_octave=1,
+    )
+    goals = [Goal(name, 0.5, 8, 8) for name in NAMES]
     found = _reference(SimpleNamespace(plan=plan, goals=goals), NAMES, None)[0]  # type: ignore[arg-type]
     for one, value in zip(found[:, 0], expected, strict=True):
         assert value is None or one == pytest.approx(value, rel=1e-5, nan_ok=True)

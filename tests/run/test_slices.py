@@ -19,7 +19,7 @@ from smolux.methods import acceptance_rejection, base, inverse, low_rank, size_c
 from smolux.methods.acceptance_rejection_pieces import SLACK
 from smolux.methods.low_rank_store import POOL_NEEDED, TAIL
 from smolux.methods.size_class_state import CHUNK, FREE
-from smolux.plan import make_plan
+from smolux.planning import make_plan
 from smolux.replicas import Group
 
 slow = pytest.mark.slow
@@ -46,7 +46,15 @@ def started(case: str, method: str, population: str, first: int, count: int) -> 
     kinds, density, particles, end = CASES[case]
     model = sx.Model(sx.kernels.formula("1 + 0*(i + j)"), kinds, sx.initial.monodisperse(density))
     plan = make_plan(
-        model, [0.3 * end, end], method, "number", population, particles, 3, 5, (0, 1), 16, 4, False
+        model,
+        [0.3 * end, end],
+        method=method,
+        population=population,
+        particles=particles,
+        replicas=3,
+        seed=5,
+        orders=(0, 1),
+        sizes=16,
     )
     return Group.start(plan, first, count)
 

@@ -20,7 +20,7 @@ from smolux.core.state import new_tally
 from smolux.errors import InputError, SmoluxWarning
 from smolux.goal import Goal, Trial, judge, plan_replicas
 from smolux.observe import observable
-from smolux.plan import make_plan
+from smolux.planning import make_plan
 
 pytestmark = shared.stopped
 
@@ -230,9 +230,19 @@ def test_what_pilots_do_not_see_takes_more_of_them() -> None:
 def test_evaporation_without_a_collision_is_something() -> None:
     """Of a size of which nothing was seen nothing is certain, although nothing has collided."""
     plan = make_plan(
-        runs.model(0.1), [1.0], "acceptance-rejection", "number", "none", 20, 8, 1, (0, 1), 4, 1,
-        False, 0.1, "n_3",
-    )  # fmt: skip
+        runs.model(0.1),
+        [1.0],
+        method="acceptance-rejection",
+        population="none",
+        particles=20,
+        replicas=8,
+        seed=1,
+        orders=(0, 1),
+        sizes=4,
+        bins_per_octave=1,
+        target_error=0.1,
+        target="n_3",
+    )
     tally = new_tally(8, plan.grid, 4, 2)
     tally.scalars[:] = 1.0
     tally.scalars[..., 2] = 0.0  # collisions

@@ -12,12 +12,12 @@ import smolux as sx
 from smolux.deterministic import SolverError
 from smolux.deterministic import terms as terms_module
 from smolux.deterministic.account import Account, Entry
-from smolux.deterministic.arguments import Settings
 from smolux.deterministic.gel import may_gel
 from smolux.deterministic.lattice import on_multiples
 from smolux.deterministic.low_rank import LowRank
 from smolux.deterministic.solver import with_error
 from smolux.errors import InputError, SmoluxWarning
+from smolux.settings import SolverSettings
 
 P = sx.processes
 AGGREGATION = P.Aggregation()
@@ -166,7 +166,7 @@ def test_the_error_is_that_of_the_worst_moment(monkeypatch):
     monkeypatch.setattr(
         "smolux.deterministic.solver.Run", lambda *_, **__: SimpleNamespace(dataset=lambda: other)
     )
-    settings = Settings((1.0,), "auto", 1e-8, None, None, ds["order"].values, 8, 4, "inert")
+    settings = SolverSettings((1.0,), orders=tuple(ds["order"].values), sizes=8)
     np.testing.assert_allclose(with_error(ds, model, settings)["error"], 1e-3, rtol=1e-9)
 
 

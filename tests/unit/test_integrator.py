@@ -17,7 +17,7 @@ from smolux.deterministic.terms import Totals
 from smolux.deterministic.timemesh import TimeMesh
 from smolux.deterministic.window import Window
 from smolux.errors import InputError, Interrupted, SmoluxWarning
-from smolux.plan import make_plan
+from smolux.planning import make_plan
 
 AGGREGATION = sx.processes.Aggregation()
 
@@ -235,7 +235,17 @@ def test_dataset():
     np.testing.assert_allclose(mass, 10.0, rtol=1e-12)
     np.testing.assert_allclose(json.loads(ds.attrs["mass_error"]), 0.0, atol=1e-8)
     # the bins of a simulation, as many as there is something in
-    plan = make_plan(model, [1.0], "inverse", "number", "doubling", 9, 1, 1, (0,), 16, 2, False)
+    plan = make_plan(
+        model,
+        [1.0],
+        method="inverse",
+        particles=9,
+        replicas=1,
+        seed=1,
+        orders=(0,),
+        sizes=16,
+        bins_per_octave=2,
+    )
     np.testing.assert_array_equal(ds["bin_lower"], plan.grid.edges[: ds.sizes["bin"]])
     k = np.arange(1, 17)
     np.testing.assert_allclose(ds["n"][0, 0], 0.4 * 0.8 ** (k - 1), rtol=1e-12)

@@ -95,13 +95,19 @@ def second_moments(
 
 def loop_seconds(physics: sx.Model, time_end: float, particles: int, method: str) -> float:
     """Processor seconds of the event loop of one run, compilation and set-up left out."""
-    from smolux.plan import make_plan
+    from smolux.planning import make_plan
     from smolux.replicas import Group
 
     plan = make_plan(
-        physics, [time_end], method, "number", "doubling", particles, 1, SEED, (0, 1, 2, 3),
-        1024, 4, False,
-    )  # fmt: skip
+        physics,
+        [time_end],
+        method=method,
+        particles=particles,
+        replicas=1,
+        seed=SEED,
+        orders=(0, 1, 2, 3),
+        sizes=1024,
+    )
     group = Group.start(plan, 0, 1)
     group.compile()
     start = time.thread_time()

@@ -17,6 +17,7 @@ from typing import Any
 from .. import units
 from ..errors import InputError
 from ..model import Model
+from ..settings.solution import OBSERVED
 from .lines import Path, line_numbers
 from .physics import build, model_tables, read_physics
 from .reader import Problems, Table
@@ -81,9 +82,8 @@ class Case:
     def solve_arguments(self) -> dict[str, Any]:
         """Return the arguments of `smolux.solve`: what is observed is that of a simulation."""
         assert self.solve is not None
-        like = self.run or Run
-        shared = ("orders", "sizes", "bins_per_octave")
-        return self.solve.arguments() | {name: getattr(like, name) for name in shared}
+        like = self.run or self.solve
+        return self.solve.arguments() | {name: getattr(like, name) for name in OBSERVED}
 
     def with_seed(self) -> Case:
         """Return the case with a seed: its own, or a new one."""
@@ -108,7 +108,8 @@ class Case:
                     times = tables[name]["times"]
                     tables[name]["times"] = [units.text(float(t), units.TIME) for t in times]
         if self.run and self.solve:
-            del tables["solve"]["times"]
+            for name in ("times", *OBSERVED):
+                del tables["solve"][name]
         if self.parallel != Parallel():
             tables["parallel"] = as_table(self.parallel)
         tables["output"] = as_table(self.output)
@@ -220,8 +221,7 @@ def _read(content: Mapping[str, Any], problems: Problems) -> Case:
     run = read_run(content["run"], problems) if "run" in content else None
     solve = None
     if "solve" in content:
-        shared = run.times if run else ()
-        solve = read_solve(content["solve"], shared if "run" in content else None, problems)
+        solve = read_solve(content["solve"], run, "run" in content, problems)
     if not ("run" in content or "solve" in content):
         problems.add(
             (), "a table [run] is missing, with times = [...]; or [solve] for the solver alone"

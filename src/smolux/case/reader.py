@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from .. import units
-from ..errors import InputError, did_you_mean
+from ..errors import InputError, Problem, did_you_mean
 from .lines import Path, lookup
 
 
@@ -113,6 +113,17 @@ class Table:
         value = show(self.content.get(key))
         self.problems.add((*self.path, key), f"{self._label(key)} = {value}: {message}")
 
+    def wrong(self, problem: str, hint: str = "") -> None:
+        """Note what is wrong with an argument: at its key, in the words of the file."""
+        if not isinstance(problem, Problem):
+            self.problems.add(self.path, problem)
+            return
+        key = str(problem.path[-1])
+        if key in self:
+            self.bad(key, problem.cure + hint)
+        else:
+            self.problems.add((*self.path, key), f"{self._label(key)}: {problem.cure}{hint}")
+
     def _label(self, key: str) -> str:
         return dotted((*self.path, key))
 
@@ -184,22 +195,8 @@ class Table:
             return default
         return value
 
-    def seconds(self, key: str, default: Any) -> Any:
-        """Return a stretch of wall time: seconds, or a text such as "2 h"."""
-        value = self.take(key, _MISSING)
-        if value is _MISSING:
-            return default
-        if isinstance(value, str):
-            value = self._parsed((key,), value, units.TIME)
-            if value is None:
-                return default
-        good = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if not (good and math.isfinite(value) and value > 0):
-            self.bad(key, 'must be a wall time above zero: seconds, or a text such as "2 h"')
-            return default
-        return float(value)
-
-    def _parsed(self, where: Path, value: str, dimension: units.Dimension) -> float | None:
+    def parsed(self, where: Path, value: str, dimension: units.Dimension) -> float | None:
+        """Return a text with a unit as an SI number; None, with a note, if it is none."""
         try:
             return units.parse(value, dimension)
         except InputError as error:
@@ -212,7 +209,7 @@ class Table:
         path = (*self.path, *where)
         if isinstance(value, str):
             self.problems.measured.append((path, True))
-            return self._parsed(where, value, dimension)
+            return self.parsed(where, value, dimension)
         if not isinstance(value, (int, float)) or isinstance(value, bool):
             self.problems.add(
                 path,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any
 
@@ -14,57 +14,30 @@ import numpy as np
 from .. import units
 from ..errors import InputError, did_you_mean
 from ..executors import KINDS
-from ..goal import make_goal
-from ..population import POPULATIONS
+from ..settings import Control, Settings, SolverSettings, simulation, solution
+from ..settings.kinds import Kind, Seconds, Times, declared
+from ..settings.solution import OBSERVED
+from ..weighting import WeightFunction
+from ..weighting.weight_function import STEEPEST
 from .reader import Problems, Table, show
 
 #: the most output times a table of times may ask for
 _MOST_TIMES = 1_000_000
 _SPACINGS = ("linear", "log")
-#: what may stand in ``[solve]``, see `smolux.solve`
-SOLVERS = ("auto", "direct", "low-rank")
-GELS = ("inert", "reacts")
 #: kinds of figures, see `smolux.plotting`
 FIGURES = ("clusters", "moments", "size-distribution", "oscillations", "scaling")
 
 
 @dataclass(frozen=True)
-class Run:
-    """How a case is simulated; the arguments of `smolux.simulate`."""
+class Run(Settings):
+    """How a case is simulated: the arguments of `smolux.simulate`."""
 
-    times: tuple[float, ...]
-    particles: int = 100_000
-    replicas: int = 8
-    seed: int | None = None
-    method: str = "auto"
-    weighting: str = "number"
-    exponent: float | None = None
-    population: str = "doubling"
-    orders: tuple[float, ...] = (0, 1, 2, 3)
-    sizes: int = 1024
-    bins_per_octave: int = 4
-    distribution: bool = False
-    checkpoint_every: float = 600.0
-    time_limit: float | None = None
-    target_error: float | None = None
-    target: str = "number_density"
-    max_replicas: int = 1000
-    subvolumes: int = 1
-    remix: float = 1.0
+    checkpoint_every: float = declared(Control, "checkpoint_every")
+    time_limit: float | None = declared(Control, "time_limit")
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments of `smolux.simulate` that decide on the data."""
-        apart = ("checkpoint_every", "time_limit", "exponent")
-        given = {k: v for k, v in asdict(self).items() if k not in apart}
-        return given | {"weighting": self.weighted()}
-
-    def weighted(self) -> Any:
-        """Return the weighting: its name, or an object if it has a setting."""
-        if self.exponent is None:
-            return self.weighting
-        from ..weighting import WeightFunction
-
-        return WeightFunction(self.exponent)
+        return {f.name: getattr(self, f.name) for f in fields(Settings)}
 
 
 @dataclass(frozen=True)
@@ -77,22 +50,15 @@ class Parallel:
 
 
 @dataclass(frozen=True)
-class Solve:
-    """How a case is solved deterministically; the arguments of `smolux.solve`.
+class Solve(SolverSettings):
+    """How a case is solved deterministically: the arguments of `smolux.solve`.
 
-    `times` are those of the simulation if there is one.
+    Times, and what is observed, are those of the simulation if there is one.
     """
-
-    times: tuple[float, ...]
-    method: str = "auto"
-    tolerance: float = 1e-8
-    window: int | None = None
-    max_window: int | None = None
-    gel: str = "inert"
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments of `smolux.solve`."""
-        return {k: v for k, v in asdict(self).items() if v is not None}
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
 @dataclass(frozen=True)
@@ -104,50 +70,52 @@ class Output:
 
 
 def read_run(content: Any, problems: Problems) -> Run | None:
-    """Read ``[run]``; None if its times are missing or wrong."""
-    from ..methods import METHODS
-    from ..weighting import WEIGHTINGS
-
+    """Read ``[run]``; None if anything of it is wrong."""
     table = Table(content, ("run",), problems)
-    times = read_times(table)
-    settings = {
-        "particles": table.integer("particles", Run.particles, 2, 2**40),
-        "replicas": table.integer("replicas", Run.replicas, 1, 1_000_000),
-        "seed": table.integer("seed", None, 0),
-        "method": table.choice("method", Run.method, ["auto", *(m.name for m in METHODS)]),
-        "weighting": table.choice(
-            "weighting", Run.weighting, ["auto", *(w.name for w in WEIGHTINGS)]
-        ),
-        "exponent": _exponent(table),
-        "population": table.choice("population", Run.population, list(POPULATIONS)),
-        "orders": read_orders(table),
-        "sizes": table.integer("sizes", Run.sizes, 1, 10_000_000),
-        "bins_per_octave": table.integer("bins_per_octave", Run.bins_per_octave, 1, 100),
-        "distribution": table.flag("distribution", Run.distribution),
-        "subvolumes": table.integer("subvolumes", Run.subvolumes, 1, 1024),
-        "remix": table.number("remix", Run.remix, above=0.0),
-        "checkpoint_every": table.seconds("checkpoint_every", Run.checkpoint_every),
-        "time_limit": table.seconds("time_limit", Run.time_limit),
-    }
-    goal = {
-        "target_error": table.take("target_error"),
-        "target": table.take("target", Run.target),
-        "max_replicas": table.integer("max_replicas", Run.max_replicas, 1, 1_000_000),
-    }
-    wrong: list[str] = []
-    make_goal(
-        **goal, replicas=settings["replicas"], orders=settings["orders"], sizes=settings["sizes"],
-        problems=wrong,
-    )  # fmt: skip
-    keys = ("target_error", "target", "max_replicas", "replicas")
-    problems.add_error(("run",), InputError([f"{w}" for w in wrong]), keys)
+    before = len(problems.messages)
+    good = _read(Run, table)
+    exponent = _exponent(table)
+    if exponent is not None and good.get("weighting") == WeightFunction.name:
+        good["weighting"] = WeightFunction(exponent)
+    for wrong in simulation.disagreements(good):
+        table.wrong(wrong)
     table.finish()
-    return Run(times, **settings, **goal) if times and not wrong else None
+    return Run(**good) if len(problems.messages) == before else None
+
+
+def _read(table_of: Any, table: Table, apart: Sequence[str] = ()) -> dict[str, Any]:
+    """Read the keys that are the fields of settings; what is wrong is left out, and noted."""
+    good = {}
+    for f in fields(table_of):
+        kind = f.metadata["kind"]
+        if f.name in apart:
+            continue
+        if isinstance(kind, Times):
+            value = read_times(table)
+        else:
+            value = read_key(table, f.name, kind, f.default)
+        if value is not None or f.default is None:
+            good[f.name] = value
+    return good
+
+
+def read_key(table: Table, key: str, kind: Kind, default: Any) -> Any:
+    """Read a key of some kind; the default if it is left out or, with a note, wrong."""
+    value = table.take(key, default)
+    if isinstance(kind, Seconds) and isinstance(value, str):
+        value = table.parsed((key,), value, units.TIME)
+    try:
+        return value if value is default else kind.check(key, value)
+    except InputError as error:
+        hint = ', or a text such as "2 h"' if isinstance(kind, Seconds) else ""
+        for wrong in error.problems:
+            table.wrong(wrong, hint)
+    return default
 
 
 def _exponent(table: Table) -> float | None:
     """Read the power of the size that is the weight."""
-    needed = table.content.get("weighting") == "weight-function"
+    needed = table.content.get("weighting") == WeightFunction.name
     if "exponent" not in table:
         table.known.append("exponent")
         if needed:
@@ -157,8 +125,9 @@ def _exponent(table: Table) -> float | None:
     if not needed:
         table.bad("exponent", 'is for weighting = "weight-function"; take one of both out')
         return None
-    if value is not None and not abs(value) <= 8:
-        table.bad("exponent", "must be a number from -8 to 8")
+    if value is not None and not abs(value) <= STEEPEST:
+        table.bad("exponent", f"must be a number from -{STEEPEST:g} to {STEEPEST:g}")
+        return None
     return value
 
 
@@ -182,40 +151,35 @@ def read_parallel(content: Any, run: Run | None, problems: Problems) -> Parallel
     return found
 
 
-def read_solve(content: Any, run_times: tuple[float, ...] | None, problems: Problems) -> Any:
-    """Read ``[solve]``, with the times of the simulation if there is one."""
+def read_solve(content: Any, run: Run | None, beside: bool, problems: Problems) -> Solve | None:
+    """Read ``[solve]``; `beside` a simulation its times and what it observes hold for both."""
     table = Table(content, ("solve",), problems)
-    times: tuple[float, ...] | None
-    if run_times is not None:
-        times = run_times
-        if "times" in table:
-            table.bad("times", "the times of [run] hold for both; take this line out")
-            table.take("times")
-    else:
-        times = read_times(table)
-    settings = {
-        "method": table.choice("method", Solve.method, SOLVERS),
-        "tolerance": table.number("tolerance", Solve.tolerance, above=0.0),
-        "window": _renamed(table, "window", "largest"),
-        "max_window": _renamed(table, "max_window", "max_size"),
-        "gel": table.choice("gel", Solve.gel, GELS),
-    }
-    if not settings["tolerance"] <= 0.1:
-        table.bad("tolerance", "must be at most 0.1; 1e-8 is usual")
+    before = len(problems.messages)
+    names = ("times", *OBSERVED) if beside else ()
+    for name in names:
+        if name in table:
+            table.bad(name, f"the {name} of [run] hold for both; take this line out")
+            table.take(name)
+    shared = {} if run is None else {"times": run.times}
+    for former, key in (("largest", "window"), ("max_size", "max_window")):
+        _rename(table, former, key)
+    good = _read(Solve, table, names) | shared
+    for wrong in solution.disagreements(good):
+        table.wrong(wrong)
     table.finish()
-    return Solve(times, **settings) if times else None
+    return Solve(**good) if "times" in good and len(problems.messages) == before else None
 
 
-def _renamed(table: Table, key: str, former: str) -> int | None:
-    """Return a number of sizes by a key, or by the one that it had before."""
+def _rename(table: Table, former: str, key: str) -> None:
+    """Take a key by the name that it had before."""
     if former not in table:
-        return table.integer(key, None, 4, 100_000_000)
+        return
     if key in table:
         table.bad(former, f"is called {key} now, which is given, too; take this line out")
         table.take(former)
-        return None
+        return
     warnings.warn(f"solve.{former} is called {key} now", DeprecationWarning, stacklevel=2)
-    return table.integer(former, None, 4, 100_000_000)
+    table.content[key] = table.content.pop(former)
 
 
 def read_output(content: Any, problems: Problems) -> Output:
@@ -240,18 +204,6 @@ def read_output(content: Any, problems: Problems) -> Output:
     return output
 
 
-def read_orders(table: Table) -> tuple[float, ...]:
-    """Read the orders of the moments: different finite numbers."""
-    value = table.take("orders", list(Run.orders))
-    good = isinstance(value, list) and all(
-        isinstance(p, (int, float)) and not isinstance(p, bool) and abs(p) <= 20 for p in value
-    )
-    if not (good and value and len(set(value)) == len(value)):
-        table.bad("orders", "must be a list of different numbers from -20 to 20, such as [0, 1, 2]")
-        return Run.orders
-    return tuple(int(p) if p == int(p) else p for p in value)
-
-
 def read_times(table: Table) -> tuple[float, ...] | None:
     """Read output times: a list, or a table of start, stop, count and spacing."""
     value = table.take("times")
@@ -265,16 +217,12 @@ def read_times(table: Table) -> tuple[float, ...] | None:
     times = [table.convert(("times", n), t, units.TIME) for n, t in enumerate(value)]
     if None in times:
         return None
-    if not times:
-        table.bad("times", "give at least one time")
+    try:
+        return Times().check("times", times)
+    except InputError as error:
+        for wrong in error.problems:
+            table.wrong(wrong)
         return None
-    if min(times) < 0 or any(b <= a for a, b in pairwise(times)):
-        table.bad("times", "must be zero or more and ascending")
-        return None
-    if times[-1] == 0:
-        table.bad("times", "the last one must be above zero")
-        return None
-    return tuple(times)
 
 
 def _spaced(value: Mapping[str, Any], parent: Table) -> tuple[float, ...] | None:
@@ -322,4 +270,7 @@ def _ascending(times: Sequence[float]) -> bool:
 def as_table(settings: Any) -> dict[str, Any]:
     """Write settings as a table of the case file, what is None left out."""
     values = {f.name: getattr(settings, f.name) for f in fields(settings)}
+    weighting = values.get("weighting")
+    if isinstance(weighting, WeightFunction):
+        values |= {"weighting": weighting.name, "exponent": weighting.exponent}
     return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items() if v is not None}

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from ..settings.kinds import Seconds
 from . import contents, read_text
 from .reader import Problems, Table, show
-from .settings import read_times
+from .settings import read_key, read_times
 from .write import to_toml
 
 if TYPE_CHECKING:
@@ -174,7 +175,7 @@ def _read_flight(content: Any, problems: Problems) -> Flight | None:
         "clusters": table.integer("clusters", Flight.clusters, 1),
         "until": table.number("until", None, above=0.0),
         "max_events": table.integer("max_events", None, 1),
-        "time_limit": table.seconds("time_limit", None),
+        "time_limit": read_key(table, "time_limit", Seconds(optional=True), None),
     }
     if settings["initial"] == "lattice" and settings["radius_sigma"] > 1:
         table.bad("radius_sigma", 'on a lattice all discs are equal; use initial = "random"')

@@ -13,7 +13,7 @@ from ..case.write import value
 from ..deterministic.arguments import checked as solver_settings
 from ..errors import InputError
 from ..executors import check_installed
-from ..plan import make_plan
+from ..planning import make_plan
 from ..resources import cores
 from .console import amount, duration
 from .estimate import estimate, negative_rates, physics_warnings
@@ -51,10 +51,12 @@ def refusals(case: Case) -> list[str]:
     """Find what a run of the case would refuse before it begins, such as for want of memory."""
     plans: list[Callable[[], object]] = [partial(check_installed, case.parallel.executor)]
     if case.run is not None:
-        plans.append(partial(make_plan, case.model, **case.run.arguments()))
+        given = case.run.arguments()
+        if given["weighting"] == "auto":  # a pilot finds it, and hardly differs in what it needs
+            given["weighting"] = "number"
+        plans.append(partial(make_plan, case.model, **given))
     if case.solve is not None:
-        settings = {"window": None, "max_window": None} | case.solve_arguments()
-        plans.append(partial(solver_settings, case.model, **settings))
+        plans.append(partial(solver_settings, case.model, case.solve_arguments()))
     found = []
     for plan in plans:
         try:
@@ -85,9 +87,10 @@ def description(case: Case) -> list[str]:
             f"{run.population}, seed {'new each time' if run.seed is None else run.seed}"
         )
         if run.weighting != Run.weighting:
-            power = "" if run.exponent is None else f", exponent {run.exponent:g}"
+            table = as_table(run)
+            power = f", exponent {table['exponent']:g}" if "exponent" in table else ""
             power = f", for {run.target}" if run.weighting == "auto" else power
-            lines.append(f"weighting    {run.weighting}{power}")
+            lines.append(f"weighting    {table['weighting']}{power}")
         if run.target_error is not None:
             lines.append(
                 f"until        the 95 % interval of {run.target} is ±{100 * run.target_error:g} %, "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,6 +17,7 @@ from ..deterministic.solver import solve
 from ..errors import InputError, Interrupted, did_you_mean, quiet
 from ..methods import METHODS
 from ..results import warnings
+from ..settings.solution import OBSERVED
 from . import console
 from .progress import Display
 
@@ -115,17 +116,14 @@ def _simulated(case: Case, name: str, number: int, progress: Display) -> Compute
 def _solved(case: Case, progress: Display) -> Computed:
     run = case.run
     assert run is not None
-    settings: dict[str, Any] = {"times": run.times, "tolerance": 1e-6}
+    settings = {name: getattr(run, name) for name in ("times", *OBSERVED)} | {"tolerance": 1e-6}
     if case.model.kernel.gels and case.model.only_aggregates:
         settings["gel"] = "reacts"  # as it does in a simulation
     if case.solve is not None:
-        settings = {k: v for k, v in asdict(case.solve).items() if v is not None}
+        settings = case.solve_arguments()
     begun = time.perf_counter()
     with quiet():
-        ds = solve(
-            case.model, **settings, orders=run.orders, sizes=run.sizes,
-            bins_per_octave=run.bins_per_octave, progress=progress,
-        )  # fmt: skip
+        ds = solve(case.model, **settings, progress=progress)
     wall = time.perf_counter() - begun
     compiling = float(ds.attrs.get("compile_seconds", 0.0))
     return Computed(SOLVER, ds, wall - compiling, compiling, float("nan"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any
 
@@ -13,16 +13,17 @@ import smolux
 
 from ..case import Case
 from ..case.settings import Run
+from ..content import frozen
 from ..errors import Interrupted, quiet
 from ..initial import Sizes
 from ..methods import METHODS, SizeClass
 from ..methods.base import Method
-from ..pilot import settled
-from ..plan import make_plan
+from ..pilot import chosen_weighting
 from ..population import doubles_at
 from ..processes import Aggregation, Removal, Source
 from ..resources import available_memory, cores
 from ..room import amount
+from ..settings import Settings
 
 Float = NDArray[np.float64]
 
@@ -133,13 +134,11 @@ def weighted(case: Case) -> Any:
     run = case.run
     assert run is not None
     if run.weighting != "auto":
-        return run.weighted()
-    plan = make_plan(
-        case.model, run.times, run.method, "auto", run.population, run.particles, 1,
-        _SEED if run.seed is None else run.seed, run.orders, run.sizes, 1, False,
-        target=run.target,
-    )  # fmt: skip
-    return settled(plan).weighting
+        return run.weighting
+    settings = Settings.checked(run.arguments() | {"replicas": 1, "target_error": None})
+    if settings.seed is None:
+        settings = replace(settings, seed=_SEED)
+    return chosen_weighting(frozen(case.model), settings)[0]
 
 
 def _once(case: Case, particles: int, weighting: Any) -> tuple[Any, bool]:

@@ -22,6 +22,7 @@ from ..deterministic.solver import solve
 from ..errors import InputError, Interrupted, OutOfMemoryError, WorkerError, quiet
 from ..executors import opened
 from ..model_dict import model_to_dict
+from ..settings import Settings
 from . import figures, report
 from .console import duration, say
 from .progress import Display
@@ -160,7 +161,7 @@ _CHANGED = (
 def _data(case: Case, settings: str) -> dict[str, Any]:
     """Return the settings that decide on the data."""
     if settings == "solve" and case.solve is not None:
-        return asdict(case.solve)
+        return case.solve.arguments()
     return {} if case.run is None else case.run.arguments()
 
 
@@ -172,24 +173,9 @@ def _check_plan(plan: Any, case: Case) -> None:
     InputError
         If it does not.
     """
-    goal, run = plan.goal, case.run
-    if run is None:
-        raise InputError(_CHANGED)
-    begun = {
-        "seed": plan.entropy,
-        "method": "auto" if plan.reason else plan.method.name,
-        "weighting": "auto" if plan.weighting_reason else plan.weighting,
-        "replicas": plan.replicas if goal is None else goal.first,
-        "target_error": None if goal is None else goal.error,
-        # without a goal they say nothing
-        "target": run.target if goal is None else goal.target,
-        "max_replicas": run.max_replicas if goal is None else goal.most,
-    }
     same = model_to_dict(plan.model) == model_to_dict(case.model)
-    for name, value in run.arguments().items():
-        found = begun[name] if name in begun else getattr(plan, name)
-        same = same and value in (found, getattr(found, "name", found))
-    if not same:
+    asked = None if case.run is None else Settings.checked(case.run.arguments())
+    if not same or asked != plan.asked:
         raise InputError(_CHANGED)
 
 

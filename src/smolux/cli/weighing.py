@@ -75,7 +75,7 @@ def run(
     try:
         ds = ensembles.efficiency(
             seeded.model,
-            list(methods or [settings.method]),
+            methods or [settings.method],
             chosen,
             list(observables or dict.fromkeys([settings.target, "M2"])),
             times=settings.times,

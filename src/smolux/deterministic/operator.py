@@ -16,7 +16,6 @@ from .trial import Sample, values
 
 Float = NDArray[np.float64]
 
-METHODS = ("auto", "direct", "low-rank")
 #: a kernel matrix up to this many bytes is kept
 _CACHE = 320 << 20
 #: entries of a kernel matrix that are handled at once

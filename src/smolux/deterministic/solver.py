@@ -15,7 +15,8 @@ from ..errors import InputError, Interrupted
 from ..model import Model
 from ..processes import Source
 from ..results import to_dataset, told
-from .arguments import Settings, checked, renamed
+from ..settings import SolverSettings
+from .arguments import checked, renamed
 from .equations import Equations
 from .gel import may_gel
 from .integrate import Integrator, SolverError
@@ -169,10 +170,12 @@ def solve(
     """
     window = renamed("window", window, "largest", largest)
     max_window = renamed("max_window", max_window, "max_size", max_size)
-    settings = checked(
-        model, times, method, tolerance, window, max_window, orders, sizes, bins_per_octave, gel,
-        check,
-    )  # fmt: skip
+    given = {
+        "times": times, "method": method, "tolerance": tolerance, "window": window,
+        "max_window": max_window, "orders": orders, "sizes": sizes,
+        "bins_per_octave": bins_per_octave, "gel": gel, "check": check,
+    }  # fmt: skip
+    settings = checked(model, given)
     model = frozen(model)
     dataset = Run(model, settings, progress).dataset()
     if check:
@@ -187,7 +190,7 @@ class Run:
     ----------
     model : Model
         Frozen.
-    settings : Settings
+    settings : SolverSettings
     progress : callable, optional
     room : int
         The first window is so many times larger than usual.
@@ -196,7 +199,7 @@ class Run:
     def __init__(
         self,
         model: Model,
-        settings: Settings,
+        settings: SolverSettings,
         progress: Callable[[Progress], None] | None = None,
         room: int = 1,
     ) -> None:
@@ -222,10 +225,14 @@ class Run:
             window,
             TimeMesh.of(laws, settings.times[-1], settings.tolerance),
             settings.tolerance,
-            settings.orders,
+            np.array(settings.orders),
         )
         self.observer = Observer(
-            settings.orders, settings.sizes, settings.bins_per_octave, mass, model.processes
+            np.array(settings.orders),
+            settings.sizes,
+            settings.bins_per_octave,
+            mass,
+            model.processes,
         )
 
     def _window(self, unit: int) -> Window:
@@ -251,7 +258,7 @@ class Run:
                 "most; measure sizes in a larger unit, or give window to leave out what lies "
                 "beyond it"
             )
-        order = max(3.0, float(settings.orders.max()))
+        order = max(3.0, *settings.orders)
         return Window(limit, order, settings.tolerance, settings.window is not None)
 
     def dataset(self) -> xr.Dataset:
@@ -355,7 +362,7 @@ def largest_size(model: Model) -> int:
     return max([model.initial.largest, *sources])
 
 
-def with_error(dataset: xr.Dataset, model: Model, settings: Settings) -> xr.Dataset:
+def with_error(dataset: xr.Dataset, model: Model, settings: SolverSettings) -> xr.Dataset:
     """Add the largest relative difference of number density and moments from a looser solution."""
     looser = replace(settings, tolerance=min(10.0 * settings.tolerance, 0.1))
     other = Run(model, looser, room=1 if settings.window else 2).dataset()

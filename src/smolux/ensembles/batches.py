@@ -15,22 +15,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.assembly import rates_for
 from smolux.checks import whole
+from smolux.content import frozen
 from smolux.core.rng import streams
 from smolux.core.state import BUDGET, DONE, State
 from smolux.errors import InputError
-from smolux.goal import FEWEST, Goal, make_goal
+from smolux.goal import FEWEST, Goal, named
 from smolux.initial import Sizes
 from smolux.methods.base import Method
 from smolux.model import Model
 from smolux.observe import observable
-from smolux.pilot import settled
-from smolux.plan import Plan, make_plan
+from smolux.plan import Plan
+from smolux.planning import checked, decided
 from smolux.replicas import Group, empty_state, initial_populations
 from smolux.totals import Totals, attempts_of
 from smolux.weighting.base import Weighting
-from smolux.windows import windows_for
 
 from .moments import Moments
 
@@ -78,9 +77,7 @@ class Sampler:
 
     def __init__(self, plan: Plan, observables: Sequence[str]) -> None:
         self.plan = plan
-        self.goals = [_goal(name, plan.orders, plan.sizes, []) for name in observables]
-        self._looks = [replace(plan, goal=goal) for goal in self.goals]
-        self._windows = windows_for(plan.model.processes, plan.times[-1], plan.weighting)
+        self.goals = [Goal(name, 0.5, FEWEST, FEWEST) for name in observables]
         first = Group.start(plan, 0, 1)
         first.compile()
         first.advance(lambda: False)
@@ -99,12 +96,12 @@ class Sampler:
         Arrays that do not get longer with the number of replicas are such tables.
         """
         plan = self.plan
-        count, rates = plan.replicas, rates_for(plan.model, plan.weighting)
+        count = plan.replicas
         works = []
         for replicas in (1, count):
-            self._state = empty_state(plan, streams(plan.entropy, 0, replicas))
+            self._state = empty_state(plan, streams(plan.seed, 0, replicas))
             populations = initial_populations(plan, range(replicas))
-            works.append(plan.method.new_work(rates, populations, self._state, plan.mass))
+            works.append(plan.method.new_work(plan.rates, populations, self._state, plan.mass))
         one, many = (work._asdict() for work in works)
         self._tables = {k for k in one if np.shape(one[k]) == np.shape(many[k])}
         known = {k: getattr(learnt, k) for k in self._tables}
@@ -117,9 +114,9 @@ class Sampler:
         plan = self.plan
         if self._state is None or count != plan.replicas:
             return Group.start(plan, first, count, self._loop)
-        rng = streams(plan.entropy, first, count)
+        rng = streams(plan.seed, first, count)
         state = State(rng, *(array.copy() for array in self._state[1:]))
-        return Group.of(plan, first, state, self._fresh(), self._windows, self._loop)
+        return Group.of(plan, first, state, self._fresh(), plan.windows(), self._loop)
 
     def _fresh(self) -> Any:
         """Return the stores at the start: each thread has its own, and its tables fill up."""
@@ -138,7 +135,8 @@ class Sampler:
         group.advance(stop)
         group.codes[1:] = BUDGET
         group.advance(stop)
-        return np.stack([observable(look, [group])[0] for look in self._looks], axis=1)
+        found = [observable(self.plan, goal, [group])[0] for goal in self.goals]
+        return np.stack(found, axis=1)
 
     def batch(self, first: int, count: int, stop: Callable[[], bool]) -> Batch:
         """Run these replicas on this thread."""
@@ -174,17 +172,27 @@ def make_sampler(
     if number is None or number < 2:
         problems.append(f"replicas = {replicas!r}: must be a whole number of at least 2")
     try:
-        plan = make_plan(
-            model, times, method, weighting, population, particles, min(number or 1, _TOGETHER),
-            seed, orders,
-            min(max(sizes, min(_SIZES, whole(particles) or 1)), _LARGEST), 1, False,
-            target=names[0] if names and not problems else "number_density",
-        )  # fmt: skip
+        settings = checked(
+            model,
+            {
+                "times": times,
+                "method": method,
+                "weighting": weighting,
+                "population": population,
+                "particles": particles,
+                "replicas": min(number or 1, _TOGETHER),
+                "seed": seed,
+                "orders": orders,
+                "sizes": min(max(sizes, min(_SIZES, whole(particles) or 1)), _LARGEST),
+                "bins_per_octave": 1,
+                "target": names[0] if names and not problems else "number_density",
+            },
+        )
     except InputError as error:
         raise InputError([*problems, *error.problems]) from None
     if problems or number is None:
         raise InputError(problems)
-    plan = settled(plan)
+    plan = decided(frozen(model), settings)
     row = len(plan.times) * (plan.sizes + 64)
     together = min(_TOGETHER, _PARTICLES // plan.particles, _OBSERVED // row, number // _FEWEST)
     return Sampler(replace(plan, replicas=max(1, together)), names)
@@ -202,19 +210,11 @@ def _parsed(observables: Any, problems: list[str]) -> tuple[list[str], tuple[flo
     texts = [str(name) for name in given]
     orders = {float(t[1:]) for t in texts if re.fullmatch(r"M-?\d+(\.\d+)?", t)} or {0.0}
     sizes = max((int(t[2:]) for t in texts if re.fullmatch(r"n_\d+", t)), default=1)
-    wrong: list[str] = []
     for name in given:
-        _goal(name, tuple(orders), min(sizes, _LARGEST), wrong)
-    problems += [text.replace("target = ", "observables: ", 1) for text in wrong]
+        named(name, tuple(orders), min(sizes, _LARGEST), problems, "observables")
     if len(set(texts)) < len(texts):
         problems.append(f"observables = {observables!r}: a name comes twice")
     return texts, tuple(sorted(orders)), sizes
-
-
-def _goal(name: Any, orders: tuple[float, ...], sizes: int, problems: list[str]) -> Goal:
-    """Read the name of an observable as `simulate` reads that of a target."""
-    goal = make_goal(0.5, name, FEWEST, FEWEST, orders, sizes, problems)
-    return goal or Goal("number_density", 0.5, FEWEST, FEWEST)
 
 
 def interleaved(

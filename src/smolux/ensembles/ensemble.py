@@ -245,7 +245,7 @@ def described(sampler: Sampler, found: Sequence[Collected], wanted: int) -> dict
         "initial_particles": plan.particles,
         "replicas": replicas,
         "complete": replicas == wanted,
-        "seed": str(plan.entropy),
+        "seed": str(plan.seed),
     }
 
 

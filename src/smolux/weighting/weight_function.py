@@ -19,7 +19,7 @@ from ..sizefunction import SizeFunction
 from .base import Float, Weighting
 
 #: the largest power of the size that makes sense
-_STEEPEST = 8.0
+STEEPEST = 8.0
 
 
 def power(size: Any, q: Any) -> Any:
@@ -74,10 +74,10 @@ class WeightFunction(Weighting):
     def __post_init__(self) -> None:
         given = self.w
         if is_number(given):
-            if not abs(float(given)) <= _STEEPEST:
+            if not abs(float(given)) <= STEEPEST:
                 raise InputError(
                     f"weight function = {given!r}: the power of the size must be a number from "
-                    f"-{_STEEPEST:g} to {_STEEPEST:g}"
+                    f"-{STEEPEST:g} to {STEEPEST:g}"
                 )
             object.__setattr__(self, "w", float(given))
             return

@@ -1,0 +1,129 @@
+"""What decides the numbers of a simulation, besides its model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError, Problem
+from ..goal import FEWEST, Goal, named
+from ..population import POPULATIONS
+from .kinds import Choice, Flag, Number, Orders, Registered, Text, Times, Whole, checked, setting
+
+if TYPE_CHECKING:
+    from ..methods.base import Method
+    from ..weighting.base import Weighting
+
+#: the replicas from this number on are pilots, see `smolux.goal`
+PILOT = 2**31
+#: particles that a sub-volume has at least: with less, fewer sub-volumes are used
+LEAST = 1000
+#: densities that are given size by size at most; there are bins above
+MOST_SIZES = 100_000_000
+
+METHOD = Registered("smolux.methods", "METHODS", "Method")
+WEIGHTING = Registered("smolux.weighting", "WEIGHTINGS", "Weighting")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The arguments of `smolux.simulate` that decide its numbers, as it describes them."""
+
+    times: tuple[float, ...] = setting(Times(), kw_only=False)
+    method: str | Method = setting(METHOD, "auto")
+    weighting: str | Weighting = setting(WEIGHTING, "number")
+    population: str = setting(Choice(POPULATIONS), "doubling")
+    particles: int = setting(Whole(2, 2**50), 100_000)
+    replicas: int = setting(Whole(1, PILOT - 1), 8)
+    seed: int | None = setting(Whole(0, optional=True), None)
+    orders: tuple[float, ...] = setting(Orders(), (0, 1, 2, 3))
+    sizes: int = setting(Whole(1, MOST_SIZES), 1024)
+    bins_per_octave: int = setting(Whole(1, 1024), 4)
+    distribution: bool = setting(Flag(), False)
+    target_error: float | None = setting(
+        Number(
+            lambda e: 0 < e < 1,
+            "a number between 0 and 1, the half width of the 95 % interval over the mean, such "
+            "as 0.001",
+            optional=True,
+        ),
+        None,
+    )
+    target: str = setting(Text(), "number_density")
+    max_replicas: int = setting(Whole(1, PILOT - 1), 1000)
+    subvolumes: int = setting(Whole(1, 1024), 1)
+    remix: float = setting(
+        Number(
+            lambda r: 0 < r <= 10,
+            "a number of collisions for each particle, above 0 and at most 10",
+        ),
+        1.0,
+    )
+
+    @classmethod
+    def checked(cls, given: Mapping[str, Any]) -> Settings:
+        """Check arguments, all at once.
+
+        Raises
+        ------
+        InputError
+            With every mistake.
+        """
+        good, problems = checked(cls, given)
+        problems += disagreements(good)
+        if problems:
+            raise InputError(problems)
+        return cls(**good)
+
+    @property
+    def goal(self) -> Goal | None:
+        """What replicas are added for, if they are."""
+        if self.target_error is None:
+            return None
+        return Goal(self.target, self.target_error, self.replicas, self.max_replicas)
+
+
+def disagreements(good: Mapping[str, Any]) -> list[str]:
+    """Say which arguments do not go together, of those that are right by themselves."""
+    problems: list[str] = []
+
+    def known(*names: str) -> bool:
+        return all(name in good for name in names)
+
+    if known("target", "orders", "sizes"):
+        named(good["target"], good["orders"], good["sizes"], problems)
+    if good.get("weighting") == "auto" and good.get("target") == "largest":
+        problems.append(
+            Problem(
+                "target",
+                'with weighting = "auto" the largest of the simulated particles is another '
+                "quantity with each weighting; name a density or a moment as target, or a "
+                "weighting",
+                "largest",
+            )
+        )
+    if known("subvolumes", "particles") and good["subvolumes"] > 1:
+        parts, particles = good["subvolumes"], good["particles"]
+        if particles < LEAST * parts:
+            cure = (
+                f"each needs {LEAST} particles or more, and particles = {particles}: use fewer "
+                "sub-volumes, or several replicas instead"
+            )
+            problems.append(Problem("subvolumes", cure, parts))
+    if good.get("target_error") is not None and "replicas" in good:
+        problems += _too_few(good["replicas"], good.get("max_replicas"))
+    return problems
+
+
+def _too_few(first: int, most: int | None) -> list[str]:
+    """Say which numbers of replicas do not go with a target."""
+    if first < FEWEST:
+        cure = (
+            f"with target_error at least {FEWEST}, with which the run begins; fewer say too little "
+            "of the scatter"
+        )
+        return [Problem("replicas", cure, first)]
+    if most is not None and most < first:
+        return [Problem("max_replicas", f"must be at least replicas = {first!r}", most)]
+    return []

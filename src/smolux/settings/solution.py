@@ -1,0 +1,63 @@
+"""What decides a solution of the rate equations, besides its model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import InputError, Problem
+from .kinds import Choice, Flag, Number, Orders, Times, Whole, checked, setting
+from .simulation import MOST_SIZES
+
+#: how sums over pairs are taken, and what a gel does, see `smolux.solve`
+METHODS = ("auto", "direct", "low-rank")
+GELS = ("inert", "reacts")
+_SMALLEST = 4
+#: arguments that say what is observed: in a case file those of the simulation
+OBSERVED = ("orders", "sizes", "bins_per_octave")
+
+
+@dataclass(frozen=True)
+class SolverSettings:
+    """The arguments of `smolux.solve` that decide its numbers, as it describes them."""
+
+    times: tuple[float, ...] = setting(Times(), kw_only=False)
+    method: str = setting(Choice(METHODS), "auto")
+    tolerance: float = setting(
+        Number(lambda e: 1e-12 <= e <= 0.1, "a number from 1e-12 to 0.1; 1e-8 is usual"), 1e-8
+    )
+    window: int | None = setting(Whole(_SMALLEST, MOST_SIZES, optional=True), None)
+    max_window: int | None = setting(Whole(_SMALLEST, MOST_SIZES, optional=True), None)
+    orders: tuple[float, ...] = setting(Orders(), (0, 1, 2, 3))
+    sizes: int = setting(Whole(1, MOST_SIZES), 1024)
+    bins_per_octave: int = setting(Whole(1, 1024), 4)
+    gel: str = setting(Choice(GELS), "inert")
+    check: bool = setting(Flag(), False)
+
+    @classmethod
+    def checked(cls, given: Mapping[str, Any]) -> SolverSettings:
+        """Check arguments, all at once.
+
+        Raises
+        ------
+        InputError
+            With every mistake.
+        """
+        good, problems = checked(cls, given)
+        problems += disagreements(good)
+        if problems:
+            raise InputError(problems)
+        return cls(**good)
+
+
+def disagreements(good: Mapping[str, Any]) -> list[str]:
+    """Say which arguments do not go together, of those that are right by themselves."""
+    window, most = good.get("window"), good.get("max_window")
+    if window is None or most is None:
+        return []
+    cure = (
+        f"with max_window = {most!r}: the first fixes the number of sizes, the second limits its "
+        "growth: give one of them"
+    )
+    return [Problem("window", cure, window)]
