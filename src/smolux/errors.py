@@ -39,16 +39,21 @@ class Problem(str):
     def __new__(cls, key: str, cure: str, *value: Any) -> Problem:
         """Put the text together."""
         shown = "".join(f" = {v!r}" for v in value)
-        return cls._made(f"{key}{shown}: {cure}", (key,), cure)
+        return cls.at(f"{key}{shown}: {cure}", key, cure=cure)
 
     @classmethod
-    def _made(cls, text: str, path: tuple[str | int, ...], cure: str) -> Problem:
+    def at(cls, text: str, *path: str | int, cure: str = "") -> Problem:
+        """Say what is wrong in words that name the argument in their own way."""
         self = super().__new__(cls, text)
-        self.path, self.cure = path, cure
+        self.path, self.cure = path, cure or text
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self)._made, (str(self), self.path, self.cure)
+        return _restored, (str(self), self.path, self.cure)
+
+
+def _restored(text: str, path: tuple[str | int, ...], cure: str) -> Problem:
+    return Problem.at(text, *path, cure=cure)
 
 
 class InputError(ValueError):
@@ -77,6 +82,19 @@ class InputError(ValueError):
 
     def __reduce__(self) -> tuple[type[InputError], tuple[list[str]]]:
         return type(self), (self.problems,)
+
+
+@contextmanager
+def about(*path: str | int) -> Iterator[None]:
+    """Give mistakes found within their place: what leads to the argument from outside."""
+    try:
+        yield
+    except InputError as error:
+        error.problems = [
+            Problem.at(p, *path, *getattr(p, "path", ()), cure=getattr(p, "cure", ""))
+            for p in error.problems
+        ]
+        raise
 
 
 class OutOfMemoryError(InputError):

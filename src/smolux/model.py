@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from .errors import InputError
+from .errors import InputError, Problem
 from .initial import Initial, monodisperse
 from .kernels.base import Kernel
 from .processes import Aggregation, Removal, Source
@@ -72,7 +72,8 @@ class Model:
         if not problems:
             problems = _open_problems(processes, self.initial)
         if not problems:
-            problems = self.kernel.problems(self.initial.largest)
+            found = self.kernel.problems(self.initial.largest)
+            problems = [Problem.at(text, "kernel", "formula") for text in found]
         alone = any(not isinstance(p, PairProcess) for p in processes)
         if not problems and self.kernel.vanishes and not alone:
             problems = [

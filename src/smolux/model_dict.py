@@ -10,7 +10,7 @@ import numpy as np
 
 from . import kernels
 from .callables import Function
-from .errors import InputError, did_you_mean
+from .errors import InputError, Problem, about, did_you_mean
 from .initial import INITIALS, Initial, Sizes, from_sizes, monodisperse
 from .kernels.base import Kernel
 from .laws import Law, Stated
@@ -19,6 +19,9 @@ from .processes import PROCESSES
 from .processes.base import Process
 
 T = TypeVar("T")
+#: the keys that lead to a part of a model
+Place = tuple[str | int, ...]
+_INITIAL: Place = ("initial",)
 
 #: the key under which a Python function stands with its source text, which nothing is rebuilt from
 FUNCTION = "function"
@@ -108,11 +111,18 @@ class _Reader:
             return "", {}
         return str(name), {str(k): v for k, v in given.items() if k != "name"}
 
-    def build(self, what: str, kind: Callable[..., T], given: Mapping[str, Any]) -> T | None:
+    def build(
+        self, path: Place, what: str, kind: Callable[..., T], given: Mapping[str, Any]
+    ) -> T | None:
         """Make a dataclass of its fields."""
         known = {f.name: f for f in fields(kind)}  # type: ignore[arg-type]
-        wrong = [
-            f"{what}: there is no parameter {k!r}{did_you_mean(k, list(known)) if known else ''}"
+        wrong: list[str] = [
+            Problem.at(
+                f"{what}: there is no parameter {k!r}"
+                + (did_you_mean(k, list(known)) if known else ""),
+                *path,
+                k,
+            )
             for k in given
             if k not in known
         ]
@@ -128,16 +138,19 @@ class _Reader:
             if isinstance(v, Mapping) and FUNCTION in v
         ]
         self.problems += wrong
-        return None if wrong else self.attempt(what, kind, **given)
+        return None if wrong else self.attempt(path, what, kind, **given)
 
-    def attempt(self, what: str, make: Callable[..., T], *args: Any, **given: Any) -> T | None:
-        """Call a constructor."""
+    def attempt(
+        self, path: Place, what: str, make: Callable[..., T], *args: Any, **given: Any
+    ) -> T | None:
+        """Call a constructor; its mistakes are at `path`."""
         try:
-            return make(*args, **given)
+            with about(*path):
+                return make(*args, **given)
         except InputError as error:
             self.problems += error.problems
         except (TypeError, ValueError, OverflowError) as error:
-            self.problems.append(f"{what}: {error}")
+            self.problems.append(Problem.at(f"{what}: {error}", *path))
         return None
 
     def kernel(self, given: Any) -> Kernel | None:
@@ -148,22 +161,25 @@ class _Reader:
                 "back; wrap it again with smolux.kernels.from_function"
             )
             return None
-        return self.attempt("kernel", kernels.from_dict, given)
+        return self.attempt(("kernel",), "kernel", kernels.from_dict, given)
 
-    def process(self, given: Any) -> Process | None:
-        """Rebuild a process."""
+    def process(self, number: int, given: Any) -> Process | None:
+        """Rebuild the process of this number."""
         kinds = {p.name: p for p in PROCESSES}
         name, rest = self.table("process", given, list(kinds))
-        return self.build(f"process {name!r}", kinds[name], rest) if name else None
+        if not name:
+            return None
+        return self.build(("processes", number), f"process {name!r}", kinds[name], rest)
 
     def initial(self, given: Any) -> Initial | None:
         """Rebuild an initial condition."""
         kinds = {i.name: i for i in INITIALS}
         name, rest = self.table("initial", given, [*kinds, "monodisperse"])
         if name == "monodisperse":
-            return self.attempt("initial 'monodisperse'", monodisperse, **rest)
+            return self.attempt(_INITIAL, "initial 'monodisperse'", monodisperse, **rest)
         if name != Sizes.name:
-            return self.build(f"initial {name!r}", kinds[name], rest) if name else None
+            what = f"initial {name!r}"
+            return self.build(_INITIAL, what, kinds[name], rest) if name else None
         densities = rest.pop("densities", None)
         if rest or not isinstance(densities, Mapping):
             self.problems.append(
@@ -172,7 +188,9 @@ class _Reader:
             )
             return None
         return self.attempt(
-            "initial 'sizes'", lambda: from_sizes({int(k): float(v) for k, v in densities.items()})
+            _INITIAL,
+            "initial 'sizes'",
+            lambda: from_sizes({int(k): float(v) for k, v in densities.items()}),
         )
 
 
@@ -210,7 +228,7 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
     if "processes" in data:
         given = data["processes"]
         if isinstance(given, Sequence) and not isinstance(given, str):
-            parts["processes"] = tuple(reader.process(p) for p in given)
+            parts["processes"] = tuple(reader.process(n, p) for n, p in enumerate(given))
         else:
             reader.problems.append(f"processes = {given!r}: must be a list of tables")
     if "initial" in data:

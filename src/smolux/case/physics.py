@@ -83,29 +83,8 @@ def build(physics: Physics, si: bool, problems: Problems) -> Model | None:
     try:
         return model_from_dict(data)
     except InputError as error:
-        for message in error.problems:
-            problems.add(_place(message, data), message)
+        problems.add_error((), error)
     return None
-
-
-def _place(message: str, data: Mapping[str, Any]) -> Path:
-    """Find the key that a message of the model is about: a guess that only chooses the line."""
-    tables: list[tuple[Path, Mapping[str, Any]]] = []
-    for section in ("kernel", "initial"):
-        if isinstance(data.get(section), Mapping):
-            tables.append(((section,), data[section]))
-    tables += [(("processes", n), p) for n, p in enumerate(data.get("processes", ()))]
-
-    def likeness(entry: tuple[Path, Mapping[str, Any]]) -> int:
-        path, table = entry
-        # "kernel 'brownian': ...", "the shattering rate = ...", "initial density ..."
-        return 2 * (f"{table.get('name')}" in message) + (str(path[0])[:7] in message)
-
-    path, table = max(tables, key=likeness, default=((), {}))
-    for key in table:
-        if key != "name" and (f"{key} = " in message or f"{key!r}" in message):
-            return (*path, key)
-    return path
 
 
 # --- kernel -----------------------------------------------------------------------------------
@@ -211,7 +190,7 @@ def _constructed(table: Table, law: type[Kernel], constructor: str) -> tuple[dic
     try:
         kernel = make(**given)
     except InputError as error:
-        table.problems.add_error(table.path, error, list(given))
+        table.problems.add_error(table.path, error)
         return {}, ""
     data = {"name": law.name, **{f.name: getattr(kernel, f.name) for f in fields(kernel)}}
     origin = ", ".join(f"{k} = {table.content[k]}" for k in given)

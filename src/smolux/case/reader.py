@@ -62,11 +62,10 @@ class Problems:
         where = f"{self.source}, line {line}" if line else self.source
         self.messages.append((line or 0, f"{where}: {message}"))
 
-    def add_error(self, path: Path, error: InputError, keys: Sequence[str] = ()) -> None:
-        """Note every mistake of `error`; one that begins with a key of the table stands there."""
+    def add_error(self, path: Path, error: InputError) -> None:
+        """Note every mistake of `error`, at the argument that it is about if it knows that."""
         for message in error.problems:
-            start = message.split(" ", 1)[0].rstrip(":,;")
-            self.add((*path, start) if start in keys else path, message)
+            self.add((*path, *getattr(message, "path", ())), message)
 
     def check_units(self) -> bool:
         """Note a mix of quantities with and without units; True if all have units."""

@@ -197,7 +197,7 @@ def _check_method(flight: Flight, table: Table) -> None:
         try:
             flight.arguments()
         except InputError as error:
-            table.problems.add_error(table.path, error, _STEPPING)
+            table.problems.add_error(table.path, error)
         return
     for key in _STEPPING:
         if key in table:

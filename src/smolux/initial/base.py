@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import is_number
-from ..errors import InputError
+from ..errors import InputError, Problem
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -163,7 +163,7 @@ def is_above(least: float, value: Any) -> bool:
 def check_positive(problems: list[str], **values: float) -> None:
     """Note every value that is no positive finite number."""
     problems += [
-        f"{key} = {value!r}: must be a positive finite number"
+        Problem(key, "must be a positive finite number", value)
         for key, value in values.items()
         if not is_above(0.0, value)
     ]

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..errors import Problem
 from .base import Float, Initial, Int, as_number, check_positive, is_above, refuse
 
 
@@ -22,7 +23,9 @@ class Exponential(Initial):
         problems: list[str] = []
         check_positive(problems, density=self.density)
         if not (is_above(0.0, self.mean) and self.mean >= 1):
-            problems.append(f"mean = {self.mean!r}: the mean size must be a number of at least 1")
+            problems.append(
+                Problem("mean", "the mean size must be a number of at least 1", self.mean)
+            )
         refuse(problems, self, 0.0 if problems else 37.0 * self.mean)
 
     @property

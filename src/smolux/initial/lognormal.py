@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..errors import Problem
 from .base import Float, Initial, Int, as_number, check_positive, is_above, refuse
 
 #: change of M1 by rounding to whole sizes, relative, above which a result warns of it
@@ -29,10 +30,8 @@ class Lognormal(Initial):
         problems: list[str] = []
         check_positive(problems, median=self.median, density=self.density)
         if not is_above(1.0, self.sigma):
-            problems.append(
-                f"sigma = {self.sigma!r}: the geometric standard deviation must exceed 1 "
-                "(1.3 is narrow, 2 is wide)"
-            )
+            cure = "the geometric standard deviation must exceed 1 (1.3 is narrow, 2 is wide)"
+            problems.append(Problem("sigma", cure, self.sigma))
         most = 0.0
         if not problems:  # the tail is cut off 8.2 standard deviations from the median
             most = math.exp(min(math.log(self.median) + 8.3 * math.log(self.sigma), 700.0))

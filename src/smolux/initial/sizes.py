@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, Problem
 from .base import LARGEST, Float, Initial, Int, as_number, is_above
 
 
@@ -25,12 +25,18 @@ class Sizes(Initial):
         if not self.sizes:
             problems.append("initial sizes: at least one size is needed, for example {1: 1.0}")
         problems += [
-            f"initial size {s!r}: sizes are whole numbers from 1 to 2**61"
+            Problem.at(
+                f"initial size {s!r}: sizes are whole numbers from 1 to 2**61", "densities", str(s)
+            )
             for s in self.sizes
             if not isinstance(s, int) or isinstance(s, bool) or not 1 <= s <= LARGEST
         ]
         problems += [
-            f"initial density {d!r} of size {s}: must be a finite number, zero or more"
+            Problem.at(
+                f"initial density {d!r} of size {s}: must be a finite number, zero or more",
+                "densities",
+                str(s),
+            )
             for s, d in zip(self.sizes, self.densities_, strict=True)
             if not (d == 0.0 or is_above(0.0, d))
         ]

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.errors import InputError
+from smolux.errors import InputError, Problem
 from smolux.intervals import Interval
 
 from ..checks import is_number
@@ -239,15 +239,16 @@ def check_parameters(kernel: Kernel, zero: bool = False, **ranges: tuple[float, 
         value = getattr(kernel, f.name)
         where = f"kernel {kernel.name!r}: {f.name} = {value!r}"
         if not is_number(value):
-            problems.append(f"{where}: must be a number")
+            problems.append(Problem.at(f"{where}: must be a number", f.name))
         elif not np.isfinite(value):
-            problems.append(f"{where}: must be a finite number")
+            problems.append(Problem.at(f"{where}: must be a finite number", f.name))
         elif f.name == "scale" and not (value > 0 or (zero and value == 0)):
-            problems.append(f"{where}: must be {'zero or more' if zero else 'positive'}")
+            sign = "zero or more" if zero else "positive"
+            problems.append(Problem.at(f"{where}: must be {sign}", f.name))
         elif f.name in ranges and not ranges[f.name][0] <= value <= ranges[f.name][1]:
             low, high = ranges[f.name]
             limits = f"from {low:g} to {high:g}" if high < np.inf else f"at least {low:g}"
-            problems.append(f"{where}: must be {limits}")
+            problems.append(Problem.at(f"{where}: must be {limits}", f.name))
     if problems:
         raise InputError(problems)
 
@@ -261,7 +262,7 @@ def check_positive(what: str, **values: float) -> None:
         With every problem found.
     """
     problems = [
-        f"{what}: {key} = {value!r}: must be a positive finite number"
+        Problem.at(f"{what}: {key} = {value!r}: must be a positive finite number", key)
         for key, value in values.items()
         if not (is_number(value) and np.isfinite(value) and value > 0)
     ]

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 from smolux.callables import wrong_number
-from smolux.errors import InputError
+from smolux.errors import InputError, Problem, about
 from smolux.formula import Formula, check_names, parse
 from smolux.laws import Law
 
@@ -94,12 +94,14 @@ def formula(
     """
     problems = check_names(list(parameters), (*SIZES, *_KEYS), "kernel")
     for name, value in parameters.items():
-        problems += wrong_number(value, f"kernel: parameter {name!r}")
+        wrong = wrong_number(value, f"kernel: parameter {name!r}")
+        problems += [Problem.at(text, name) for text in wrong]
     problems += [] if degree is None else wrong_number(degree, "kernel: degree")
     if gels not in (None, True, False):
         problems.append(f"kernel: gels = {gels!r}: must be True, False or None")
     try:
-        expression = parse(text, (*SIZES, *parameters), "kernel formula")
+        with about("formula"):
+            expression = parse(text, (*SIZES, *parameters), "kernel formula")
         problems += [
             f"kernel formula = {text!r}: parameter {name!r} does not occur in it; leave it out"
             for name in parameters

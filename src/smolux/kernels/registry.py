@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from smolux.errors import InputError, did_you_mean
+from smolux.errors import InputError, Problem, about, did_you_mean
 
 from .base import Kernel
 from .formula_kernel import formula
@@ -71,8 +71,10 @@ def from_dict(table: Mapping[str, Any]) -> Kernel:
         return _sum(rest)
     make = _maker(name)
     accepted = inspect.signature(make).parameters
-    problems = [
-        f"kernel {name!r}: unknown parameter {key!r}{did_you_mean(key, list(accepted))}"
+    problems: list[str] = [
+        Problem.at(
+            f"kernel {name!r}: unknown parameter {key!r}{did_you_mean(key, list(accepted))}", key
+        )
         for key in rest
         if key not in accepted
     ]
@@ -99,11 +101,12 @@ def _sum(rest: dict[str, Any]) -> Sum:
         )
         raise InputError(problems)
     made, coefficients = [], []
-    for term in terms:
+    for n, term in enumerate(terms):
         table = dict(term) if isinstance(term, Mapping) else term
         coefficients.append(table.pop("coefficient", 1.0) if isinstance(table, dict) else 1.0)
         try:
-            made.append(from_dict(table))
+            with about("terms", n):
+                made.append(from_dict(table))
         except InputError as error:
             problems += error.problems
     if problems:

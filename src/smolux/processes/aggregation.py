@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from ..errors import about
 from ..timefunction import TimeFunction
 from .base import PairProcess
 from .daughters import Merged
@@ -48,7 +49,8 @@ class Aggregation(PairProcess):
     @property
     def factor(self) -> TimeFunction:
         """See `Process.factor`."""
-        return TimeFunction.of(self.varying, "the factor of aggregation")
+        with about("varying"):
+            return TimeFunction.of(self.varying, "the factor of aggregation")
 
     @property
     def daughters(self) -> Merged:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import about
 from ..kernels.base import Kernel
 from ..sizefunction import SizeFunction
 from ..timefunction import TimeFunction
@@ -144,7 +145,8 @@ class Varying:
     @property
     def factor(self) -> TimeFunction:
         """See `Process.factor`."""
-        return TimeFunction.of(self.varying, f"{self.name}: varying")
+        with about("varying"):
+            return TimeFunction.of(self.varying, f"{self.name}: varying")
 
 
 class RatedBySize(Varying):
@@ -155,7 +157,8 @@ class RatedBySize(Varying):
     @cached_property
     def of_size(self) -> SizeFunction:
         """The rate as a function of the size."""
-        return SizeFunction.of(self.rate, f"the {self.name} rate")
+        with about("rate"):
+            return SizeFunction.of(self.rate, f"the {self.name} rate")
 
     @property
     def law(self) -> Callable[..., Any]:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..checks import is_number
-from ..errors import InputError
+from ..errors import InputError, Problem, about
 from ..sizefunction import SizeFunction
 from ..timefunction import TimeFunction
 from .base import Float, PairProcess
@@ -81,20 +81,17 @@ class CollisionalFragmentation(PairProcess):
     variables: ClassVar[Mapping[str, str]] = {"rate": "t", "debris": "k"}
 
     def __post_init__(self) -> None:
-        TimeFunction.of(self.rate, "the rate of collisional fragmentation")
+        _ = self.factor
         number = isinstance(self.largest, (int, float, np.number))
         if self.largest is not None:
             if not (number and 1 <= self.largest <= _MOST and self.largest == int(self.largest)):
-                raise InputError(
-                    f"largest = {self.largest!r}: the largest fragment must be a whole number from "
-                    f"1 to {_MOST}"
-                )
+                cure = f"the largest fragment must be a whole number from 1 to {_MOST}"
+                raise InputError([Problem("largest", cure, self.largest)])
             object.__setattr__(self, "largest", int(self.largest))
         shares = self.shares
         if not (np.isfinite(shares).all() and (shares >= 0.0).all() and shares[0] > 0.0):
-            raise InputError(
-                f"debris = {self.debris!r}: must be finite, zero or more, and above zero for k = 1"
-            )
+            cure = "must be finite, zero or more, and above zero for k = 1"
+            raise InputError([Problem("debris", cure, self.debris)])
 
     @cached_property
     def shares(self) -> Float:
@@ -104,7 +101,8 @@ class CollisionalFragmentation(PairProcess):
             with np.errstate(all="ignore"):
                 values = np.arange(1.0, largest + 1.0) ** -float(given)
         else:
-            law = SizeFunction.of(given, "the debris")
+            with about("debris"):
+                law = SizeFunction.of(given, "the debris")
             largest = self.largest or (len(law.values) if law.values else _LARGEST)
             values = law(np.arange(1.0, largest + 1.0))
         return values / values.sum()
@@ -122,7 +120,8 @@ class CollisionalFragmentation(PairProcess):
     @property
     def factor(self) -> TimeFunction:
         """See `Process.factor`."""
-        return TimeFunction.of(self.rate, "the rate of collisional fragmentation")
+        with about("rate"):
+            return TimeFunction.of(self.rate, "the rate of collisional fragmentation")
 
     @property
     def daughters(self) -> Debris:

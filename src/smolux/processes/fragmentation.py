@@ -11,7 +11,7 @@ import numpy as np
 
 from ..callables import spread
 from ..checks import is_number
-from ..errors import InputError
+from ..errors import InputError, about
 from ..kernels import Constant, formula, from_dict, from_function
 from ..kernels.base import Kernel
 from ..kernels.numeric import SAFETY
@@ -61,10 +61,10 @@ class Fragmentation(Varying, LoneProcess):
 
     def __post_init__(self) -> None:
         _ = self.factor
-        if self.pairs.problems():
-            raise InputError(
-                [p.replace("kernel", "the fragmentation rate", 1) for p in self.pairs.problems()]
-            )
+        with about("rate"):
+            wrong = self.pairs.problems()
+            if wrong:
+                raise InputError([p.replace("kernel", "the fragmentation rate", 1) for p in wrong])
 
     @cached_property
     def pairs(self) -> Kernel:

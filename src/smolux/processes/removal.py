@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..checks import is_number
-from ..errors import InputError
+from ..errors import InputError, Problem
 from .base import Float, LoneProcess, RatedBySize
 from .daughters import Nothing
 
@@ -53,9 +53,8 @@ class Removal(RatedBySize, LoneProcess):
             if not (
                 is_number(self.above) and 1 <= self.above < 2**62 and float(self.above).is_integer()
             ):
-                problems.append(
-                    f"removal: above = {self.above!r}: must be a whole number of at least 1"
-                )
+                text = f"removal: above = {self.above!r}: must be a whole number of at least 1"
+                problems.append(Problem.at(text, "above"))
             else:
                 object.__setattr__(self, "above", int(self.above))
         elif not problems and self.of_size.constant == 0.0:

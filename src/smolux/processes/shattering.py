@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from ..errors import about
 from ..timefunction import TimeFunction
 from .base import PairProcess
 from .daughters import Debris
@@ -40,12 +41,13 @@ class Shattering(PairProcess):
     outcome: ClassVar[Callable[..., Any]] = staticmethod(_shatter)
 
     def __post_init__(self) -> None:
-        TimeFunction.of(self.rate, "the shattering rate")
+        _ = self.factor
 
     @property
     def factor(self) -> TimeFunction:
         """λ as a function of time."""
-        return TimeFunction.of(self.rate, "the shattering rate")
+        with about("rate"):
+            return TimeFunction.of(self.rate, "the shattering rate")
 
     @property
     def daughters(self) -> Debris:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import is_number
-from ..errors import InputError
+from ..errors import InputError, Problem
 from .base import Float, Process, Varying
 
 
@@ -47,12 +47,11 @@ class Source(Varying, Process):
         problems = [] if pairs else ["source: rates = {}: at least one size is needed"]
         for size, rate in pairs:
             if not (is_number(rate) and 0.0 <= rate < np.inf):
-                problems.append(
-                    f"source: the rate {rate!r} of size {size!r}: must be a finite number, zero or "
-                    "more"
-                )
+                text = f"source: the rate {rate!r} of size {size!r}: must be finite, zero or more"
+                problems.append(Problem.at(text, "rates"))
             if not (is_number(size) and 1 <= size < 2**61 and float(size).is_integer()):
-                problems.append(f"source: the size {size!r}: must be a whole number of at least 1")
+                text = f"source: the size {size!r}: must be a whole number of at least 1"
+                problems.append(Problem.at(text, "rates"))
         if not problems and not sum(float(rate) for _, rate in pairs) > 0.0:
             problems.append("source: every rate is zero; take the source out")
         if problems:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, Problem
 from ..room import needed
 from .eventlog import Logger, reasons
 from .method import LISTS, Run, SpatialMethod
@@ -286,10 +286,11 @@ class TimeStepping(SpatialMethod):
             if getattr(self, name) not in known
         ]
         if not 0 < self.step <= _LONGEST_STEP:
-            problems.append(
-                f"step = {self.step!r}: must lie above 0 and be {_LONGEST_STEP} at most: two discs "
-                "could pass each other in a longer one"
+            cure = (
+                f"must lie above 0 and be {_LONGEST_STEP} at most: two discs could pass each other "
+                "in a longer one"
             )
+            problems.append(Problem("step", cure, self.step))
         for name in (*_NAMES, "overlap", "gap", "iterations", "patience"):
             value = getattr(self, name)
             least = 0 if name in ("augmentation", "damping") else np.nextafter(0, 1)
