@@ -15,9 +15,11 @@ from shared import FORMULA
 from smolux import case as cases
 from smolux import checkpoint, pilot
 from smolux.cli import running
+from smolux.costing import event_cost
 from smolux.errors import InputError
 from smolux.goal import Goal
-from smolux.plan import Plan, event_cost, make_plan
+from smolux.plan import Plan
+from smolux.planning import make_plan
 
 METHOD = "acceptance-rejection"
 KERNEL = sx.kernels.formula(FORMULA, c0=1.0, c1=0.0, c2=0.0, c3=0.0)
@@ -184,7 +186,7 @@ def test_mistakes() -> None:
     with pytest.raises(InputError, match="this moment is not computed") as error:
         plan("M7")
     assert len(error.value.problems) == 1
-    with pytest.raises(InputError, match="weighting = 'atuo': unknown; did you mean 'auto'"):
+    with pytest.raises(InputError, match="weighting = 'atuo': is unknown; did you mean 'auto'"):
         plan("M2", weighting="atuo")
 
 

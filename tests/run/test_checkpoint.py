@@ -304,7 +304,7 @@ def test_another_model(path: Path) -> None:
 
 def test_unknown_method(path: Path) -> None:
     stopped(path)
-    edited(path, plan=lambda p: p | {"method": {"name": "invers"}})
+    edited(path, plan=lambda p: p | {"decided": p["decided"] | {"method": {"name": "invers"}}})
     one_message(path, "invers", "did you mean 'inverse'?")
 
 

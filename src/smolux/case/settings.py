@@ -269,8 +269,11 @@ def _ascending(times: Sequence[float]) -> bool:
 
 def as_table(settings: Any) -> dict[str, Any]:
     """Write settings as a table of the case file, what is None left out."""
-    values = {f.name: getattr(settings, f.name) for f in fields(settings)}
-    weighting = values.get("weighting")
-    if isinstance(weighting, WeightFunction):
-        values |= {"weighting": weighting.name, "exponent": weighting.exponent}
-    return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items() if v is not None}
+    values = {}
+    for f in fields(settings):
+        given, kind = getattr(settings, f.name), f.metadata.get("kind", Kind())
+        if isinstance(given, WeightFunction):
+            values |= {"weighting": given.name, "exponent": given.exponent}
+        else:
+            values[f.name] = kind.plain(given)
+    return {k: v for k, v in values.items() if v is not None}

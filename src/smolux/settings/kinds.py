@@ -34,7 +34,7 @@ class Kind:
 
     def plain(self, value: Any) -> Any:
         """Return a value as numbers, texts, lists and tables."""
-        return value
+        return list(value) if isinstance(value, tuple) else value
 
     def from_plain(self, value: Any) -> Any:
         """Return the value of which `plain` has made this."""
@@ -177,10 +177,6 @@ class Flag(Kind):
 class _Sequence(Kind):
     """Numbers kept as a tuple."""
 
-    def plain(self, value: Any) -> Any:
-        """See `Kind`."""
-        return list(value)
-
     def from_plain(self, value: Any) -> Any:
         """See `Kind`."""
         return tuple(value)
@@ -192,6 +188,10 @@ class Orders(_Sequence):
     def check(self, key: str, value: Any) -> Any:
         """See `Kind`."""
         return tuple(orders_of_moments(value, key).tolist())
+
+    def plain(self, value: Any) -> Any:
+        """See `Kind`; whole numbers as such."""
+        return [int(order) if order == int(order) else order for order in value]
 
 
 class Times(_Sequence):
