@@ -269,7 +269,7 @@ def _ascending(times: Sequence[float]) -> bool:
 
 def as_table(settings: Any) -> dict[str, Any]:
     """Write settings as a table of the case file, what is None left out."""
-    values = {}
+    values: dict[str, Any] = {}
     for f in fields(settings):
         given, kind = getattr(settings, f.name), f.metadata.get("kind", Kind())
         if isinstance(given, WeightFunction):
