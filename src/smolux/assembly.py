@@ -24,6 +24,8 @@ from .core.weights import (
     make_tally,
     make_weight,
 )
+from .kernels.base import Kernel
+from .kernels.constant import Constant
 from .methods.base import Method, Rates
 from .model import Model
 from .processes import Aggregation, Source
@@ -126,6 +128,36 @@ def _factors(rates: tuple[Callable[..., Any], ...]) -> Any:
     return factor
 
 
+@lru_cache(maxsize=64)
+def _shares(rates: tuple[Callable[..., Any], ...]) -> Any:
+    """Bind the shares of encounters into one function, as `_factors` does; None without any."""
+    if not rates:
+        return None
+    first = _as_float(rates[0])
+    others = _shares(rates[1:])
+    if others is None:
+
+        @piece
+        def last(r, i, j, q):
+            return first(float(i), float(j), *q[0])
+
+        return last
+
+    @piece
+    def share(r, i, j, q):
+        if r == 0:
+            return first(float(i), float(j), *q[0])
+        return others(r - 1, i, j, q[1:])
+
+    return share
+
+
+def _share_laws(pairs: Sequence[PairProcess]) -> list[Kernel]:
+    """Return the shares of encounters in which processes take place; none if those are all."""
+    laws = [p.shared for p in pairs]
+    return [] if all(law is None for law in laws) else [law or Constant() for law in laws]
+
+
 def _rates(processes: Sequence[Process]) -> tuple[Callable[..., Any], ...]:
     return tuple(process.factor.rate for process in processes)
 
@@ -147,6 +179,7 @@ def _key(model: Model, method: Method, weighting: Weighting) -> tuple[Any, ...]:
     functions += [type(p).outcome for p in pairs] + [type(p).outcome for p in lone]
     functions += [p.law for p in lone]
     functions += [p.factor.rate for p in model.processes]
+    functions += [law.rate for law in _share_laws(pairs)]
     shape = len(model.kernel.parameters), len(weighted), len(pairs), len(lone), len(sources)
     return (type(method), *shape, *((type(p), p.splits) for p in lone), *map(digest, functions))
 
@@ -158,6 +191,11 @@ def uncompilable(model: Model, weighting: Weighting) -> list[str]:
         *((f"the kernel {k.label}", k.rate, 2 + len(k.parameters)) for _, k in model.kernel.parts),
         *((f"the rate of {p.name}", p.law, 2 if p.splits else 1) for p in lone),
         *((f"the rate of {p.name} in time", p.factor.rate, 1) for p in model.processes),
+        *(
+            (f"the share of {p.name}", p.shared.rate, 2 + len(p.shared.parameters))
+            for p in model.processes
+            if isinstance(p, PairProcess) and p.shared is not None
+        ),
     ]
     if weighting.weight is not None:
         given.append(("the weight function", weighting.weight, 1))
@@ -192,10 +230,11 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
         outcome, tally = make_outcome(outcome, weight), make_tally(weight)
     pieces = method.bind(simulated, tally)
     random = weight is not None or any(type(p).random for p in pairs)
+    share = _shares(tuple(law.rate for law in _share_laws(pairs)))
     if not lone and not sources:
-        fire = make_fire(pieces.pair, pieces.update, outcome, factor, random, len(pairs))
+        fire = make_fire(pieces.pair, pieces.update, outcome, factor, random, len(pairs), share)
         burst = None
-        if pieces.burst is not None:
+        if pieces.burst is not None and share is None:
             burst = make_burst(pieces.burst, outcome, len(pairs), random)
         return make_loop(pieces, make_next_event(pieces.draw, burst), fire)
     about = [Lone(p.law, type(p).outcome, p.least, p.splits, p.opens) for p in lone]
@@ -206,7 +245,7 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
     choose = beside.make_choice(_factors(_rates(lone)), _factors(_rates(sources)), *shape)
     fire = beside.make_fire(
         pieces, outcome, factor, bind_outcomes(about), choose, make_stands(weight),
-        make_replacement(weight), ledger, rates.known, shape[0], shape[1],
+        make_replacement(weight), ledger, rates.known, shape[0], shape[1], share,
     )  # fmt: skip
     next_event = beside.make_next_event(pieces.draw, ledger.ready, draw_lone, pieces.seize, *shape)
     return make_loop(pieces, next_event, fire)
@@ -242,6 +281,7 @@ def factor_parameters(processes: Sequence[Process]) -> Parameters:
     return Parameters(
         tuple(p.factor.parameters for p in pairs or [Aggregation()]),
         tuple(p.parameters for p in pairs or [Aggregation()]),
+        tuple(law.parameters for law in _share_laws(pairs)),
         tuple(
             (p.parameters, new_splits(frozen(p.pairs).rigorous)) if p.splits else (p.parameters,)
             for p in lone

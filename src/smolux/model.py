@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from .errors import InputError, Problem
 from .initial import Initial, monodisperse
 from .kernels.base import Kernel
+from .kernels.constant import Constant
+from .kernels.shared import Shared
 from .processes import Aggregation, Removal, Source
 from .processes.base import PairProcess, Process
 
@@ -83,6 +86,19 @@ class Model:
             ]
         if problems:
             raise InputError(problems)
+        _ = self.reduced
+
+    @cached_property
+    def reduced(self) -> Model:
+        """The same law, with the share of the only process of pairs as a part of the kernel."""
+        pairs = [p for p in self.processes if isinstance(p, PairProcess)]
+        if len(pairs) != 1 or pairs[0].shared is None:
+            return self
+        share, kernel = pairs[0].shared, self.kernel
+        number = share.scale if isinstance(share, Constant) else 0.0
+        product = number * kernel if number > 0.0 else Shared(kernel, share)
+        whole = tuple(replace(p, share=1.0) if p is pairs[0] else p for p in self.processes)
+        return Model(product, whole, self.initial)
 
     @property
     def only_aggregates(self) -> bool:
@@ -92,7 +108,10 @@ class Model:
     @property
     def plain_aggregation(self) -> bool:
         """Whether aggregation alone takes place, at the rate of the kernel at all times."""
-        return self.only_aggregates and self.processes[0].factor.constant == 1.0
+        first = self.processes[0]
+        return (
+            self.only_aggregates and first.factor.constant == 1.0 and first.shared is None  # type: ignore[attr-defined]
+        )
 
     @property
     def open(self) -> bool:

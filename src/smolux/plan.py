@@ -74,10 +74,15 @@ class Plan(Settings):
             return initial
         return initial.weighted(self.weighting.weights)
 
+    @property
+    def physics(self) -> Model:
+        """The model as it is simulated, see `Model.reduced`."""
+        return self.model.reduced
+
     @cached_property
     def rates(self) -> Rates:
         """What a method needs to know of the simulated rate."""
-        return rates_for(self.model, self.weighting)
+        return rates_for(self.physics, self.weighting)
 
     @cached_property
     def _windows(self) -> Windows:
@@ -90,7 +95,7 @@ class Plan(Settings):
     @cached_property
     def loop(self) -> Any:
         """The compiled loop."""
-        return loop_for(self.model, self.method, self.weighting)
+        return loop_for(self.physics, self.method, self.weighting)
 
     @property
     def volume(self) -> float:

@@ -17,6 +17,7 @@ from .core.rng import streams
 from .core.state import (
     BAD_FACTOR,
     BAD_RATE,
+    BAD_SHARE,
     BOUND,
     BUDGET,
     BY_FACTOR,
@@ -52,10 +53,12 @@ from .core.state import (
 )
 from .errors import InputError
 from .initial import Sizes
+from .kernels.base import Kernel
+from .kernels.shared import WHOLE, Shared
 from .methods.base import size_of
 from .model import Model
 from .plan import Plan
-from .processes.base import LoneProcess
+from .processes.base import LoneProcess, PairProcess
 from .remembered import spent
 
 Int = NDArray[np.int64]
@@ -162,7 +165,7 @@ class Group:
         try:
             self._call(np.full(len(self.codes), DONE, np.int64), 0)
         except CompileError:
-            problems = uncompilable(self.plan.model, self.plan.weighting)
+            problems = uncompilable(self.plan.physics, self.plan.weighting)
             if not problems:
                 raise
             raise InputError(problems) from None
@@ -171,14 +174,14 @@ class Group:
     def _call(self, codes: Int, budget: int) -> None:
         plan = self.plan
         self.loop = self.loop or plan.loop
-        self.parameters = self.parameters or factor_parameters(plan.model.processes)
+        self.parameters = self.parameters or factor_parameters(plan.physics.processes)
         self.loop(
             self.state,
             self.work,
             self.tally,
             self.windows,
             plan.grid,
-            (*plan.model.kernel.parameters, *plan.weighting.parameters),
+            (*plan.physics.kernel.parameters, *plan.weighting.parameters),
             self.parameters,
             codes,
             budget,
@@ -253,7 +256,12 @@ class Group:
         elif code == BAD_FACTOR:
             self._repair_factor(r)
         elif code == BAD_RATE:
-            raise InputError(_bad_rate(plan.model, self.state, r))
+            raise InputError(_bad_rate(plan.physics, self.state, r))
+        elif code == BAD_SHARE:
+            process = plan.physics.processes[int(self.state.count[r, PROCESS])]
+            assert isinstance(process, PairProcess)
+            assert process.shared is not None
+            raise InputError(_bad_share(process.name, process.shared, self.state, r))
         elif code == TOO_LARGE:
             raise InputError(
                 "a cluster would reach 2**62 monomers, more than can be counted, near "
@@ -314,6 +322,15 @@ def initial_populations(plan: Plan, replicas: Sequence[int]) -> list[tuple[Int, 
     return [initial.sample(plan.particles, u) for u in draws]
 
 
+def _bad_share(name: str, share: Kernel, state: State, r: int) -> str:
+    i, j = int(state.count[r, WORST_I]), int(state.count[r, WORST_J])
+    return (
+        f"the share of {name}, {share.label}, is {float(share(i, j)):.6g} for the sizes {i} and "
+        f"{j}, met at t = {state.clock[r, TIME]:.6g}; a share is between 0 and 1: correct the "
+        "function there"
+    )
+
+
 def _bad_rate(model: Model, state: State, r: int) -> str:
     i, j = int(state.count[r, WORST_I]), int(state.count[r, WORST_J])
     if i == j == 0:  # of all particles together, see `smolux.methods.inverse_pieces`
@@ -323,6 +340,11 @@ def _bad_rate(model: Model, state: State, r: int) -> str:
             "smaller, or method = 'low-rank'"
         )
     culprit = int(state.count[r, CULPRIT])
+    if culprit == 0 and isinstance(model.kernel, Shared):
+        share = model.kernel.share
+        if not 0.0 <= float(share(i, j)) <= WHOLE:
+            name = next(p.name for p in model.processes if isinstance(p, PairProcess))
+            return _bad_share(name, share, state, r)
     if culprit == 0:
         whose, where = f"the kernel {model.kernel.label}", f"sizes {i} and {j}"
     else:

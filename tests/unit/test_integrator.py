@@ -9,6 +9,7 @@ import pytest
 
 import smolux as sx
 from smolux.deterministic import SolverError
+from smolux.deterministic.encounters import Encounters
 from smolux.deterministic.equations import Equations
 from smolux.deterministic.integrate import Integrator, Norm
 from smolux.deterministic.operator import OperatorFactory
@@ -63,7 +64,7 @@ def steps(problem, y, end, count):
 def equations(kernel=None, rate=0.1, m=24, **settings):
     kernel = kernel or sx.kernels.Ballistic()
     model = sx.Model(kernel, [AGGREGATION, sx.processes.Shattering(rate)])
-    return Equations(model, OperatorFactory(kernel, "direct", 1e-9), m, 1.0, **settings)
+    return Equations(model, Encounters(model, "direct", 1e-9), m, 1.0, **settings)
 
 
 def test_order_of_a_step():
@@ -152,14 +153,14 @@ def test_jacobian_bands():
 def test_gain_is_computed_once_or_not_at_all():
     eq = equations()
     calls = []
-    gain = eq.operator.gain
-    eq.operator.gain = lambda n: calls.append(len(n)) or gain(n)
+    gain = eq.encounters._operators[0].gain
+    eq.encounters._operators[0].gain = lambda n: calls.append(len(n)) or gain(n)
     n = np.exp(-eq.sizes / 4)
     eq.rates(np.zeros(3), np.array([n, n, n]))
     assert calls == [3]
     model = sx.Model(eq.model.kernel, [sx.processes.Shattering(0.1)])
-    alone = Equations(model, OperatorFactory(model.kernel, "direct", 1e-9), 24, 1.0)
-    alone.operator.gain = eq.operator.gain
+    alone = Equations(model, Encounters(model, "direct", 1e-9), 24, 1.0)
+    alone.encounters._operators[0].gain = eq.encounters._operators[0].gain
     alone.rates(np.zeros(3), np.array([n, n, n]))
     assert calls == [3]
 
@@ -186,7 +187,7 @@ def test_mass_that_leaves_is_accounted_for():
     assert error[1] < -0.01
     np.testing.assert_allclose(ds["moment"].sel(order=1)[0] - 1, error, rtol=1e-12, atol=1e-15)
     # what is left, by an integrator that knows nothing of windows
-    eq = Equations(model, OperatorFactory(model.kernel, "direct", 1e-9), 40, 1.0)
+    eq = Equations(model, Encounters(model, "direct", 1e-9), 40, 1.0)
     from scipy.integrate import solve_ivp
 
     def rhs(t, n):
@@ -281,7 +282,7 @@ def test_progress_and_interruption(monkeypatch):
 
 def test_failure_tells_the_time():
     model = sx.Model(sx.kernels.Constant(), [AGGREGATION, sx.processes.Shattering(0.1)])
-    eq = Equations(model, OperatorFactory(model.kernel, "direct", 1e-9), 64, 1.0)
+    eq = Equations(model, Encounters(model, "direct", 1e-9), 64, 1.0)
     rates = eq.rates
     eq.rates = lambda times, n: tuple(
         np.where(times[:, None] < 0.5, part, np.nan) for part in rates(times, n)

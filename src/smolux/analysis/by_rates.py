@@ -125,17 +125,17 @@ def _checked(ds: xr.Dataset, sizes: ArrayLike, model: Model | None) -> tuple[Any
         problems.append(
             "model = None: the result does not hold its kernel, a Python function; give the model"
         )
-    elif not found.plain_aggregation:
+    elif not found.reduced.plain_aggregation:
         names = ", ".join(p.name for p in found.processes)
         problems.append(
             f"ds: has the processes {names}; only aggregation alone is supported, at the rate of "
             "the kernel"
         )
-    if problems:
+    if problems or found is None:
         raise InputError(problems)
     settings = json.loads(ds.attrs.get("weighting_settings", "{}"))
     weightings = {w.name: w for w in (Number, MassFlow, WeightFunction)}
-    return wanted, found, weightings[ds.attrs["weighting"]](**settings)
+    return wanted, found.reduced, weightings[ds.attrs["weighting"]](**settings)
 
 
 def _weight(weighting: Weighting, size: int) -> float:

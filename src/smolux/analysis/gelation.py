@@ -184,7 +184,7 @@ def gelation(ds: xr.Dataset) -> xr.Dataset:
         )
         clusters = (ds["number_density"] * ds["volume"]).transpose("replica", "time").values
         model = model_of(ds)
-        never = model is not None and model.kernel.gels is False
+        never = model is not None and model.reduced.kernel.gels is False
         found = [
             (np.nan, np.nan) if never else _peak(t, *rows)
             for rows in zip(rest.values, clusters, strict=True)

@@ -117,7 +117,7 @@ def _solved(case: Case, progress: Display) -> Computed:
     run = case.run
     assert run is not None
     settings = {name: getattr(run, name) for name in ("times", *OBSERVED)} | {"tolerance": 1e-6}
-    if case.model.kernel.gels and case.model.only_aggregates:
+    if case.model.reduced.kernel.gels and case.model.only_aggregates:
         settings["gel"] = "reacts"  # as it does in a simulation
     if case.solve is not None:
         settings = case.solve_arguments()

@@ -279,8 +279,9 @@ def negative_rates(case: Case) -> list[str]:
 
 
 def _gelation(case: Case) -> list[str]:
-    kernel, initial = case.model.kernel, case.model.initial
-    if not case.model.only_aggregates:
+    model = case.model.reduced
+    kernel, initial = model.kernel, model.initial
+    if not model.only_aggregates:
         return []  # what breaks clusters up can prevent a gel: no statement is known
     end = case.times[-1]
     if kernel.gels is None:
@@ -290,7 +291,7 @@ def _gelation(case: Case) -> list[str]:
             f"the kernel has degree {kernel.degree:.3g}, above 1: it may gel (one cluster takes a "
             "finite share of the mass in finite time)"
         ]
-    unit = kernel.gel_time() if case.model.plain_aggregation else None
+    unit = kernel.gel_time() if model.plain_aggregation else None
     if not kernel.gels:
         return []
     after = (

@@ -29,6 +29,7 @@ from .loop import make_choose_process, schedule
 from .state import (
     BAD_FACTOR,
     BAD_RATE,
+    BAD_SHARE,
     BY_KERNEL,
     BY_SPLITS,
     CLOCKS,
@@ -205,6 +206,7 @@ def make_fire(
     known: Any,
     pairs: int,
     lones: int,
+    share: Any = None,
 ) -> Any:
     """Bind what happens when the pending event comes; see `smolux.core.loop.make_fire`.
 
@@ -213,7 +215,7 @@ def make_fire(
     `ledger` and `known` are those of `smolux.core.lone`, and not called if nothing happens to
     single particles.
     """
-    choose_pair = make_choose_process(pairs)
+    choose_pair = make_choose_process(pairs, pieces.pair, share)
     pair, update = pieces.pair, pieces.update
     enter, leave = ledger.enter, ledger.leave
 
@@ -319,9 +321,10 @@ def make_fire(
         if alive:
             r = s.count[PROCESS]
             if r < 0:
-                r = choose_pair(s, windows, factor, q) if kind == PAIR else choose(s, windows, q)
+                encounter = kind == PAIR
+                r = choose_pair(s, w, windows, factor, q) if encounter else choose(s, windows, q)
                 if r <= -2:
-                    return BAD_FACTOR
+                    return BAD_SHARE if r == -4 else BAD_FACTOR
                 s.count[PROCESS] = r
             if r >= 0:
                 reason = exchange(s, w, windows, r, p, q)

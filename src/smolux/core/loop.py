@@ -20,13 +20,14 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from . import rng
-from .bounds import thinned
+from .bounds import ROUNDING, note_bad, thinned
 from .burst import Burst
 from .compile import cold_piece, entry, piece
 from .record import make_record
 from .state import (
     BAD_FACTOR,
     BAD_RATE,
+    BAD_SHARE,
     BUDGET,
     BY_KERNEL,
     CLOCKS,
@@ -66,11 +67,35 @@ PATIENCE = 4096
 
 
 @lru_cache(maxsize=64)
-def make_choose_process(pairs: int) -> Callable[..., Any]:
-    """Bind the choice of the process of an encounter, of the first `pairs` ones."""
+def make_choose_process(
+    pairs: int, pair: Callable[..., Any] | None = None, share: Callable[..., Any] | None = None
+) -> Callable[..., Any]:
+    """Bind the choice of the process of an encounter, of the first `pairs` ones.
+
+    The `pair` is that of the method, and ``share(r, i, j, q)`` the share of the encounters of two
+    sizes in which process `r` takes place; None if that is all of them.
+    """
+    if pair is not None and share is not None:
+        choose = make_choose_process(pairs)
+
+        @piece
+        def choose_and_share(s, w, windows, factor, q):
+            """Choose the process, or none, also by the sizes; -4 if the share of them is none."""
+            r = choose(s, w, windows, factor, q)
+            if r < 0:
+                return r
+            i, j = pair(s, w)
+            value = share(r, i, j, q.shares)
+            if not 0.0 <= value <= ROUNDING:
+                note_bad(s, i, j, value)
+                s.count[PROCESS] = r
+                return -4
+            return r if rng.uniform(s.rng) < value else -1
+
+        return choose_and_share
 
     @piece
-    def choose_process(s, windows, factor, q):
+    def choose_process(s, w, windows, factor, q):
         """Choose the process, or none: thinning by the true factor at the time of the event."""
         window = s.count[WINDOW]
         if pairs == 1 and windows.edges[window + 1] == math.inf:
@@ -193,6 +218,7 @@ def make_fire(
     factor: Callable[..., Any],
     random: bool,
     pairs: int,
+    share: Callable[..., Any] | None = None,
 ) -> Callable[..., Any]:
     """Bind what happens when the pending event comes: 0 or the reason to return.
 
@@ -210,17 +236,19 @@ def make_fire(
         Whether the outcome draws random numbers.
     pairs : int
         How many processes there are.
+    share : callable, optional
+        See `make_choose_process`.
     """
-    choose_process = make_choose_process(pairs)
+    choose_process = make_choose_process(pairs, pair, share)
 
     @piece
     def fire(s, w, windows, p, q):
         if s.count[FIRST] >= 0:
             r = s.count[PROCESS]
             if r < 0:
-                r = choose_process(s, windows, factor, q)
+                r = choose_process(s, w, windows, factor, q)
                 if r <= -2:
-                    return BAD_FACTOR
+                    return BAD_SHARE if r == -4 else BAD_FACTOR
                 s.count[PROCESS] = r
             if r >= 0:
                 i, j = pair(s, w)

@@ -74,6 +74,7 @@ BAD_FACTOR = 5  # a negative or undefined factor of a process
 PAUSED = 6  # an output time was recorded
 TOO_LARGE = 7  # a size would reach the limit
 SPLITS = 8  # bounds of the splits of a size are asked for
+BAD_SHARE = 9  # a share of encounters is not between 0 and 1
 
 #: slots an octave by which single particles are told apart, as a power of two, and how many in all
 LONE_BITS = 3
@@ -152,8 +153,9 @@ class Parameters(NamedTuple):
 
     Attributes
     ----------
-    factors, outcomes : tuple
-        Of pairs: of the factors in time, and of what comes of an encounter.
+    factors, outcomes, shares : tuple
+        Of pairs: of the factors in time, of what comes of an encounter, and of the share of them
+        in which it does, if any of these is not one.
     lone, lone_factors : tuple
         Of single particles: of the rates, see `smolux.core.lone.Law`, and of the factors.
     source_factors : tuple
@@ -161,6 +163,7 @@ class Parameters(NamedTuple):
 
     factors: tuple[Any, ...]
     outcomes: tuple[Any, ...]
+    shares: tuple[Any, ...]
     lone: tuple[Any, ...]
     lone_factors: tuple[Any, ...]
     source_factors: tuple[Any, ...]

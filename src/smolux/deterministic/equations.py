@@ -7,10 +7,8 @@ from numpy.typing import NDArray
 
 from ..model import Model
 from ..processes.base import PairProcess, Process
-from ..processes.daughters import Merged
+from .encounters import Encounters, merges
 from .gel import gel_affinity
-from .meeting import Meeting
-from .operator import Direct, Operator, OperatorFactory
 from .terms import SUMS, Flow, Leaving, term_of
 from .timemesh import factor_at
 
@@ -20,8 +18,6 @@ Float = NDArray[np.float64]
 _BANDS = 32
 #: what the bands leave out may amount to so much over a step
 _LEFT_OUT = 0.1
-#: the largest window on which low rank gives way to the direct sum
-DIRECT_MOST = 1 << 13
 #: share of the mass below which there is no gel
 _NO_GEL = 1e-10
 
@@ -32,7 +28,8 @@ class Equations:
     Parameters
     ----------
     model : Model
-    factory : OperatorFactory
+    encounters : Encounters
+        Of this model.
     count : int
         The number of sizes M at first.
     mass : float
@@ -40,7 +37,7 @@ class Equations:
     gel_reacts : bool
         Whether the mass beyond the window reacts with the sizes in it.
     unit : int
-        The sizes are ``unit, 2 unit, ...``; the kernel of `factory` takes them in this unit.
+        The sizes are ``unit, 2 unit, ...``, as those of the encounters.
 
     Attributes
     ----------
@@ -51,13 +48,14 @@ class Equations:
     def __init__(
         self,
         model: Model,
-        factory: OperatorFactory,
+        encounters: Encounters,
         count: int,
         mass: float,
         gel_reacts: bool = False,
         unit: int = 1,
     ) -> None:
-        self.model, self.mass, self._factory, self._gel_reacts = model, mass, factory, gel_reacts
+        self.model, self.mass, self._gel_reacts = model, mass, gel_reacts
+        self.encounters = encounters
         self.unit, self.span = unit, (0.0, np.inf)
         self._factors = [p.factor for p in model.processes]
         self.pairs = [p for p in model.processes if isinstance(p, PairProcess)]
@@ -68,33 +66,16 @@ class Equations:
         """Take another number of sizes."""
         self.count = count
         self.sizes = self.unit * np.arange(1.0, count + 1.0)
-        self.operator: Operator = self._factory(count)
+        self.encounters.resize(count)
         self._terms = [term_of(process, self.sizes) for process in self.processes]
-        self._bands, self._tilted = np.empty((count, 0)), False
-        self._beyond: Float | None = None
+        self._bands: dict[tuple[float, ...], Float] = {}
+        self._beyond: list[Float | None] = []
         self._gel = gel_affinity(self.model.kernel, self.sizes) if self._gel_reacts else None
 
     def refine(self, n: Float) -> bool:
-        """Find the sums over pairs more exactly near densities `n`; False if there is no way.
-
-        By a tilt of the transforms for these densities; then, on windows where this can be, by the
-        direct sum.
-        """
-        if isinstance(self.operator, Direct) or not n.any():
-            return False
-        if not self._tilted:
-            self._tilted = True
-            self.operator.prepare(n)
-            return True
-        if self.count > DIRECT_MOST or not self._factory.may_change:
-            return False
-        self.operator = self._factory.direct_sum(self.count)
-        self._bands = np.empty((self.count, 0))
-        return True
-
-    def closed(self) -> None:
-        """Note that the terms of a step have added up."""
-        self._tilted = False
+        """Find the sums over pairs more exactly near densities `n`; see `Encounters.refine`."""
+        self._bands = {}
+        return self.encounters.refine(n)
 
     @property
     def cut(self) -> bool:
@@ -132,10 +113,12 @@ class Equations:
             `Totals`.
         """
         self.evaluations += len(n)
-        meeting, flow = Meeting(self.operator, self.sizes, n), Flow(n, len(self.processes))
+        meetings = self.encounters.meet(self.sizes, n)
+        flow = Flow(n, len(self.processes))
         for p, term in enumerate(self._terms):
+            meeting = meetings[self.encounters.law_of(p)]
             term.add(p, self._factor(p, times), n, meeting, flow)
-        self._beyond = None if meeting.beyond is None else meeting.beyond[-1]
+        self._beyond = [None if m.beyond is None else m.beyond[-1] for m in meetings]
         if self._gel is not None:
             self._to_gel(n, self._factor(0, times), flow)
         if self.cut:
@@ -148,12 +131,13 @@ class Equations:
         Nothing where it leaves the system. For the densities of the last call of `rates` if the
         sums held it, which are those of the end of a step, else for `n`.
         """
-        merged = [p for p, process in enumerate(self.pairs) if _merges(process)]
-        if self.cut or not merged:
+        weights = self._weights(t)[1]
+        if self.cut or not any(weights):
             return np.zeros_like(n)
-        factor = sum(float(self._factor(p, np.array([t]))[0]) for p in merged)
-        found = self._beyond if self._beyond is not None else self.operator.beyond(n)
-        return factor * found
+        if any(w > 0.0 and b is None for w, b in zip(weights, self._beyond, strict=True)):
+            return self.encounters.beyond(weights, n)
+        found = zip(weights, self._beyond, strict=True)
+        return np.asarray(sum(w * b for w, b in found if b is not None))
 
     def _to_gel(self, n: Float, factor: Float, flow: Flow) -> None:
         """Let the mass beyond the window take up particles."""
@@ -178,12 +162,27 @@ class Equations:
             return False
         return self._gel is None or self.mass - float(n @ self.sizes) <= _NO_GEL * self.mass
 
-    def shares(self, t: float) -> tuple[float, float]:
-        """Return how often loss and gain enter the rates: ``1 + λ`` and 1 with shattering."""
+    def _weights(self, t: float) -> tuple[list[float], list[float]]:
+        """Return how often loss and gain of each law of encounters enter the rates.
+
+        ``1 + λ`` and 1 with shattering.
+        """
         at = np.array([t])
         factors = [float(self._factor(p, at)[0]) for p in range(len(self.pairs))]
-        merged = sum(f for f, p in zip(factors, self.pairs, strict=True) if _merges(p))
-        return sum(factors), merged
+        merged = [f if merges(p) else 0.0 for f, p in zip(factors, self.pairs, strict=True)]
+        return self.encounters.by_law(factors), self.encounters.by_law(merged)
+
+    def loss(self, t: float, n: Float) -> Float:
+        """Return the rate at which a particle of each size vanishes in all, shape (M,)."""
+        return self.encounters.loss(self._weights(t)[0], n) + self.lone_losses(t)
+
+    def gain_by(self, t: float, n: Float, count: int) -> Float:
+        """Return how particles merge with those of the sizes ``1 .. count``, shape (M, count)."""
+        return self.encounters.columns(self._weights(t)[1], count) * n[:count]
+
+    def overflow(self, t: float, n: Float) -> Float:
+        """Return what `beyond` does, from these densities."""
+        return self.encounters.beyond(self._weights(t)[1], n)
 
     def jacobian(self, t: float, n: Float, h: float) -> tuple[Float, Float]:
         """Return the stiff part: minus its diagonal, shape (M,), and J bands below, shape (M, J).
@@ -193,11 +192,11 @@ class Equations:
         least for which other partners matter little over a step of length h. If there is none, all
         of the loss is taken, which then damps more than the gain left out can add.
         """
-        loss, gain = self.shares(t)
-        near = self._near(n, _LEFT_OUT / max(loss * h, 1e-300))
+        losses, gains = self._weights(t)
+        count, loss = self._near(losses, n, _LEFT_OUT / h)
         if self._gel is not None:
-            near[0] += self._gel * (self.mass - float(n @ self.sizes))
-        return loss * near[0] + self.lone_losses(t), gain * near[1]
+            loss = loss + losses[0] * self._gel * (self.mass - float(n @ self.sizes))
+        return loss + self.lone_losses(t), self._columns(gains, count) * n[:count]
 
     def lone_losses(self, t: float) -> Float:
         """Return the rate at which a particle of each size vanishes by itself, shape (M,)."""
@@ -207,13 +206,16 @@ class Equations:
                 total += self._factor(p, at) * term.vanishing
         return total
 
-    def _near(self, n: Float, enough: float) -> list[Float]:
-        """Return the loss by near partners, together and each; `enough` of it may be missing."""
-        total = self.operator.loss(n[None, :])[0]
+    def _near(self, weights: list[float], n: Float, enough: float) -> tuple[int, Float]:
+        """Return how many partners are near, and the loss; `enough` of it may be missing."""
+        total = self.encounters.loss(weights, n)
         most = min(_BANDS, self.count)
 
+        def near(count: int) -> Float:
+            return np.asarray(self._columns(weights, count) @ n[:count])
+
         def left_out(count: int) -> float:
-            return float(np.max(total - self._columns(count) @ n[:count]))
+            return float(np.max(total - near(count)))
 
         count = 1
         if left_out(1) > enough and most > 1:
@@ -221,15 +223,11 @@ class Equations:
             least = 1.5 * left_out(most)
             while 2 * count <= most and left_out(count) > max(enough, least):
                 count *= 2
-        columns = self._columns(count)
-        all_of_it = left_out(count) > enough
-        return [total if all_of_it else columns @ n[:count], columns * n[:count]]
+        return count, total if left_out(count) > enough else near(count)
 
-    def _columns(self, count: int) -> Float:
-        if self._bands.shape[1] < count:
-            self._bands = self.operator.columns(1 if count == 1 else min(_BANDS, self.count))
-        return self._bands[:, :count]
-
-
-def _merges(process: PairProcess) -> bool:
-    return isinstance(process.daughters, Merged)
+    def _columns(self, weights: list[float], count: int) -> Float:
+        known = self._bands.get(tuple(weights))
+        if known is None or known.shape[1] < count:
+            known = self.encounters.columns(weights, 1 if count == 1 else min(_BANDS, self.count))
+            self._bands = {**self._bands, tuple(weights): known}
+        return known[:, :count]

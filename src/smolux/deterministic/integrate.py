@@ -127,7 +127,7 @@ class Integrator:
         #: share of the highest moment that flows over the edge per time
         self._flow = 0.0
         self._most = float(n.sum())
-        equations.operator.prepare(n)
+        equations.encounters.prepare(n)
         self._begin()
 
     @property
@@ -232,7 +232,8 @@ class Integrator:
         """Return what is raised if the account does not close."""
         return SolverError(
             f"the solution ends at t = {self.t:.8g}: number and mass of the terms do not add up: "
-            f"{text}, on {len(self.n)} sizes with a {self.equations.operator.name} sum over pairs; "
+            f"{text}, on {len(self.n)} sizes with a {self.equations.encounters.name} sum over "
+            "pairs; "
             "take method='direct', or a larger tolerance",
             self.t,
         )
@@ -282,7 +283,7 @@ class Integrator:
         if count > len(n):
             self._resize(count)
         elif self.steps % _PREPARE == 0:
-            self.equations.operator.prepare(self.n)
+            self.equations.encounters.prepare(self.n)
 
     @property
     def _kept(self) -> Float | None:
@@ -309,7 +310,7 @@ class Integrator:
                 return False
             raise self._open(f"{max(number.apart, mass.apart):.1e} in a step")
         self.account.add(number, mass)
-        self.equations.closed()
+        self.equations.encounters.closed()
         return True
 
     def _accept(self, step: Step, n: Float, h: float, end: float) -> None:
@@ -346,5 +347,5 @@ class Integrator:
         self.n = np.pad(self.n, (0, more))
         if self._before is not None:
             self._before = self._before[0], np.pad(self._before[1], ((0, 0), (0, more)))
-        self.equations.operator.prepare(self.n)
+        self.equations.encounters.prepare(self.n)
         self._start = self._rates()

@@ -37,22 +37,21 @@ class Linearisation:
 
     def __init__(self, equations: Equations, n: Float) -> None:
         self.equations, self.n, self.sizes = equations, n, equations.sizes
-        equations.operator.prepare(n)
+        equations.encounters.prepare(n)
         rates, along = equations.rates(np.zeros(1), n[None, :])
         # products are with vectors that do not fall off as the densities do
-        equations.operator.prepare(None)
+        equations.encounters.prepare(None)
         self.rates = self._closed(rates[0])
         #: densities times these are of about the same size
         self.weight = self.sizes**2
-        loss, gain = equations.shares(0.0)
-        frequency = loss * equations.operator.loss(n[None, :])[0] + equations.lone_losses(0.0)
+        frequency = equations.loss(0.0, n)
         #: collisions per time, of a particle and of the mass
         self.scale = 2.0 * float(Totals.of(along[0]).events.sum()) / float(n.sum())
         self.turnover = float((n * frequency) @ self.sizes)
         count = min(_BANDS, max(_NUMBERS // len(n), 16), len(n))
         self._frequency = frequency
         self._above = _evaporation(equations)
-        self._band = gain * equations.operator.columns(count) * n[:count]
+        self._band = equations.gain_by(0.0, n, count)
 
     def _closed(self, rates: Float) -> Float:
         rates[0] -= float(rates @ self.sizes)

@@ -17,12 +17,11 @@ from ..processes import Source
 from ..results import to_dataset, told
 from ..settings import SolverSettings
 from .arguments import checked, renamed
+from .encounters import Encounters
 from .equations import Equations
 from .gel import may_gel
 from .integrate import Integrator, SolverError
-from .lattice import on_multiples
 from .observe import Observer, Snapshot
-from .operator import OperatorFactory
 from .terms import unit_of
 from .timemesh import TimeMesh
 from .window import Window, usual_limit
@@ -204,12 +203,13 @@ class Run:
         room: int = 1,
     ) -> None:
         self.model, self.settings, self.progress = model, settings, progress
+        self.physics = physics = model.reduced
         self.shots: list[Snapshot] = []
         self.started = self.told = time.perf_counter()
         start = model.initial.densities(model.initial.largest)
         unit = unit_of(model, start)
-        kernel = on_multiples(model.kernel, unit)
-        self.factory = OperatorFactory(kernel, settings.method, 0.1 * settings.tolerance)
+        tolerance = 0.1 * settings.tolerance
+        self.encounters = Encounters(physics, settings.method, tolerance, unit)
         window = self._window(unit)
         count = min(room * window.first(largest_size(model) // unit), window.limit)
         n = np.zeros(count)
@@ -217,7 +217,7 @@ class Run:
         n[: len(inside)] = inside
         mass = float(start @ np.arange(1.0, len(start) + 1.0))
         reacts = settings.gel == "reacts"
-        self.equations = Equations(model, self.factory, count, mass, reacts, unit)
+        self.equations = Equations(physics, self.encounters, count, mass, reacts, unit)
         laws = [process.factor for process in model.processes]
         self.integrator = Integrator(
             self.equations,
@@ -235,15 +235,17 @@ class Run:
             model.processes,
         )
 
+    @property
+    def _may_gel(self) -> bool:
+        return any(may_gel(law) for law in self.encounters.merging)
+
     def _window(self, unit: int) -> Window:
         """Return the rules for the number of sizes, which are multiples of the unit."""
         model, settings, cut = self.model, self.settings, self.model.cut
         largest, given = largest_size(model), settings.window or settings.max_window
         if given is None:
             hindered = len(model.processes) > 1
-            limit = usual_limit(
-                largest // unit, may_gel(model.kernel), hindered, self.factory.direct
-            )
+            limit = usual_limit(largest // unit, self._may_gel, hindered, self.encounters.direct)
         else:
             limit = max(given // unit, 1)
         if cut is not None:  # nothing is ever larger
@@ -301,12 +303,12 @@ class Run:
     def records(self, seconds: float) -> Records:
         """Return what was observed so far."""
         records = self.observer.records(self.settings.times, self.shots)
-        operator = self.equations.operator
+        sums = self.encounters
         records.attributes |= {
             "method": "solve",
-            "operator": operator.name,
-            "rank": operator.rank,
-            "kernel_error": operator.error,
+            "operator": sums.name,
+            "rank": sums.rank,
+            "kernel_error": sums.error,
             "integrator": "Radau IIA, order 7",
             "tolerance": self.settings.tolerance,
             "gel": self.settings.gel,
@@ -325,7 +327,7 @@ class Run:
         return records
 
     def _warnings(self) -> list[str]:
-        found = [*self.model.initial.remarks, *self.factory.notes]
+        found = [*self.model.initial.remarks, *self.encounters.notes]
         tolerance = self.settings.tolerance
         late = [t for t, shot in zip(self.settings.times, self.shots, strict=False)
                 if shot.beyond > tolerance]  # fmt: skip
@@ -343,7 +345,7 @@ class Run:
         return found
 
     def _cure(self) -> str:
-        if may_gel(self.model.kernel):
+        if self._may_gel:
             effect = (
                 "it reacts with them (Flory), as in a simulation"
                 if self.settings.gel == "reacts"

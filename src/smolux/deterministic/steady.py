@@ -14,10 +14,10 @@ from ..content import frozen
 from ..errors import InputError
 from ..model import Model
 from .arguments import renamed
+from .encounters import Encounters
 from .equations import Equations
 from .integrate import SolverError
 from .linearisation import Linearisation
-from .operator import OperatorFactory
 from .window import Window
 
 Float = NDArray[np.float64]
@@ -173,10 +173,11 @@ class _Search:
     ) -> None:
         start = model.initial.densities(model.initial.largest)
         self.model, self.progress, self.window = model, progress, window
+        physics = model.reduced
         self.mass = float(start @ np.arange(1.0, len(start) + 1.0))
         self.n = _guess(guess, window or _FIRST)
-        factory = OperatorFactory(model.kernel, "auto", 1e-12)
-        self.equations = Equations(model, factory, len(self.n), self.mass)
+        encounters = Encounters(physics, "auto", 1e-12)
+        self.equations = Equations(physics, encounters, len(self.n), self.mass)
         self.started = time.perf_counter()
         self.near_steady = guess is not None
         #: whether there is no room for what moves to larger sizes
@@ -226,9 +227,8 @@ class _Search:
     def _grow(self, tolerance: float, scale: float) -> bool:
         """Add sizes if too much flows over the edge in a time ``1 / scale``; return whether so."""
         window = Window(self.window or 2 * _LIMIT, 2.0, tolerance, self.window is not None)
-        operator = self.equations.operator
-        operator.prepare(self.n)
-        share = window.share(self.n, self.equations.shares(0.0)[1] * operator.beyond(self.n))
+        self.equations.encounters.prepare(self.n)
+        share = window.share(self.n, self.equations.overflow(0.0, self.n))
         count = window.next(len(self.n), share, 1.0 / scale, 0.0)[0]
         self.full = count > len(self.n) >= _LIMIT
         count = count if self.window else min(count, _LIMIT)
@@ -304,5 +304,6 @@ def eigenvalues(state: SteadyState, count: int = 6) -> Complex:
 def linearisation(state: SteadyState) -> Linearisation:
     """Return the rates near a steady state."""
     mass = state.moment(1.0)
-    factory = OperatorFactory(state.model.kernel, "auto", 1e-12)
-    return Linearisation(Equations(state.model, factory, len(state.n), mass), state.n)
+    model = state.model.reduced
+    encounters = Encounters(model, "auto", 1e-12)
+    return Linearisation(Equations(model, encounters, len(state.n), mass), state.n)

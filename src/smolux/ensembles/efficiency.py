@@ -252,7 +252,7 @@ def _reference(sampler: Sampler, names: Sequence[str], exact: Any) -> tuple[Floa
             elif goal.target != "largest":
                 row[:] = solution.moment(plan.times, goal.order or 0.0, gel=goal.order is not None)
         return values, "exact solution"
-    reacts = plan.model.kernel.gels and plan.model.only_aggregates
+    reacts = plan.physics.kernel.gels and plan.model.only_aggregates
     gel: dict[str, Any] = {"gel": "reacts"} if reacts else {}
     try:
         ds = solve(plan.model, plan.times, orders=plan.orders, sizes=plan.sizes, **gel)

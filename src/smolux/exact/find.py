@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from ..processes.base import PairProcess
 from .additive import Additive
 from .base import Solution
 from .bilinear import Bilinear
@@ -41,6 +42,7 @@ def solution(model: Model, *, gel: Literal["reacts", "inert"] = "reacts") -> Sol
     Solution or None
         None if no exact solution is known.
     """
+    model = model.reduced
     rates = _rates(model)
     law = coefficients(model.kernel)
     if rates is None or law is None or model.initial.largest != 1:
@@ -65,6 +67,8 @@ def solution(model: Model, *, gel: Literal["reacts", "inert"] = "reacts") -> Sol
 
 def _rates(model: Model) -> tuple[float, float] | None:
     """Return the rate of aggregation and that of shattering relative to it, if constant."""
+    if any(isinstance(p, PairProcess) and p.shared is not None for p in model.processes):
+        return None
     factors = {process.name: process.factor.constant for process in model.processes}
     aggregation, shattering = factors.pop("aggregation", None), factors.pop("shattering", 0.0)
     if factors or not aggregation or shattering is None:

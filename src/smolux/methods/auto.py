@@ -212,7 +212,8 @@ def effort(run: Circumstances) -> tuple[float, float]:
 
 def unforeseen(processes: Sequence[Process]) -> tuple[Method, str] | None:
     """Choose for systems that the estimate does not cover: not for encounters alone."""
-    if all(isinstance(p, PairProcess) and not p.random for p in processes):
+    pairs = [p for p in processes if isinstance(p, PairProcess)]
+    if pairs == list(processes) and not any(p.random or p.shared for p in pairs):
         return None
     return (
         SizeClass(),

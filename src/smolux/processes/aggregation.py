@@ -23,7 +23,7 @@ class Aggregation(PairProcess):
     """Colliding particles stick: ``(i) + (j) -> (i + j)`` at the rate of the kernel.
 
     The Smoluchowski equations:
-    ``dn_k/dt = f(t) (1/2 sum_{i+j=k} K n_i n_j - n_k sum_j K n_j)``.
+    ``dn_k/dt = f(t) (1/2 sum_{i+j=k} K s n_i n_j - n_k sum_j K s n_j)`` with the share s(i, j).
 
     Parameters
     ----------
@@ -31,6 +31,10 @@ class Aggregation(PairProcess):
         A function f of time by which the rate is multiplied, such as the share of encounters in
         which the particles stick, or the shear rate of a flow that slows down. Where nothing else
         happens, this is the same as another time, ``ds = f dt``.
+
+    share : float, callable or str
+        The share of the encounters in which the particles stick, between 0 and 1: a number, a
+        function of both sizes, or a formula in i and j such as ``"exp(-(i + j)/100)"``.
 
     References
     ----------
@@ -41,10 +45,10 @@ class Aggregation(PairProcess):
     name: ClassVar[str] = "aggregation"
     outcome: ClassVar[Callable[..., Any]] = staticmethod(_merge)
     #: what the fields are functions of, beside plain numbers
-    variables: ClassVar[Mapping[str, str]] = {"varying": "t"}
+    variables: ClassVar[Mapping[str, str]] = {"varying": "t", "share": "i and j"}
 
     def __post_init__(self) -> None:
-        _ = self.factor
+        _ = self.factor, self.shared
 
     @property
     def factor(self) -> TimeFunction:

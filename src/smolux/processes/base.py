@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..checks import is_number
 from ..errors import about
 from ..kernels.base import Kernel
+from ..kernels.shared import share_law
 from ..sizefunction import SizeFunction
 from ..timefunction import TimeFunction
 from .daughters import Daughters
@@ -50,9 +52,11 @@ class Process:
 class PairProcess(Process):
     """What an encounter of two particles leads to, at ``factor(t)`` times the rate of the kernel.
 
-    Both particles vanish; `outcome` names what appears in their place.
+    Both particles vanish; `outcome` names what appears in their place. It does so in the `share`
+    of the encounters, which may depend on both sizes; in the others nothing happens.
     """
 
+    share: Any = field(default=1.0, kw_only=True)
     kind: ClassVar[int] = 0
 
     #: ``outcome(i, j, sizes, counts) -> int``: plain Python that Numba can compile. Writes what
@@ -61,6 +65,14 @@ class PairProcess(Process):
     #: whether `outcome` takes ``uniform`` first, and then, after the arrays, what that takes: a
     #: function that returns a random number
     random: ClassVar[bool] = False
+
+    @cached_property
+    def shared(self) -> Kernel | None:
+        """The share as a law of both sizes, if it is not one for all."""
+        if is_number(self.share) and self.share == 1.0:
+            return None
+        with about("share"):
+            return share_law(self.share, f"the share of {self.name}")
 
     @property
     def parameters(self) -> tuple[Any, ...]:

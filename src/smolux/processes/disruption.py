@@ -65,6 +65,9 @@ class CollisionalFragmentation(PairProcess):
         always fits. ``[1]`` leaves monomers alone, as `Shattering` does.
     largest : int, optional
         The largest fragment; 64, or as many as there are values.
+    share : float, callable or str
+        The share of these encounters in which that happens, between 0 and 1: a number, a function
+        of both sizes, or a formula in i and j.
 
     References
     ----------
@@ -78,10 +81,10 @@ class CollisionalFragmentation(PairProcess):
     name: ClassVar[str] = "collisional-fragmentation"
     random: ClassVar[bool] = True
     outcome: ClassVar[Callable[..., Any]] = staticmethod(_disrupt)
-    variables: ClassVar[Mapping[str, str]] = {"rate": "t", "debris": "k"}
+    variables: ClassVar[Mapping[str, str]] = {"rate": "t", "debris": "k", "share": "i and j"}
 
     def __post_init__(self) -> None:
-        _ = self.factor
+        _ = self.factor, self.shared
         number = isinstance(self.largest, (int, float, np.number))
         if self.largest is not None:
             if not (number and 1 <= self.largest <= _MOST and self.largest == int(self.largest)):

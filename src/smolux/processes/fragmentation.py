@@ -10,11 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..callables import spread
-from ..checks import is_number
-from ..errors import InputError, about
-from ..kernels import Constant, formula, from_dict, from_function
+from ..errors import about
 from ..kernels.base import Kernel
 from ..kernels.numeric import SAFETY
+from ..kernels.shared import pair_law
 from .base import Float, LoneProcess, Varying
 from .daughters import Split
 
@@ -60,34 +59,13 @@ class Fragmentation(Varying, LoneProcess):
     variables: ClassVar[Mapping[str, str]] = {"rate": "i and j", "varying": "t"}
 
     def __post_init__(self) -> None:
-        _ = self.factor
-        with about("rate"):
-            wrong = self.pairs.problems()
-            if wrong:
-                raise InputError([p.replace("kernel", "the fragmentation rate", 1) for p in wrong])
+        _ = self.factor, self.pairs
 
     @cached_property
     def pairs(self) -> Kernel:
         """The law F, which is of the same kind as a kernel."""
-        given = self.rate
-        if isinstance(given, Kernel):
-            return given
-        if isinstance(given, Mapping):  # as in files
-            return from_dict(given)
-        if isinstance(given, str):
-            return formula(given)
-        if is_number(given):
-            if not 0.0 < given < np.inf:
-                raise InputError(
-                    f"the fragmentation rate = {given!r}: must be a finite number above zero"
-                )
-            return Constant(float(given))
-        if callable(given):
-            return from_function(given)
-        raise InputError(
-            f"the fragmentation rate = {given!r}: must be a number, a formula in i and j, a "
-            "function of two sizes or a kernel"
-        )
+        with about("rate"):
+            return pair_law(self.rate, "the fragmentation rate")
 
     @property
     def entries(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -30,6 +30,9 @@ class Shattering(PairProcess):
     rate : float, callable or str
         The parameter λ, dimensionless: a number, a function of time ``f(t)``, or a formula in ``t``
         such as ``"0.01 * (1 - t/400)"``. Never negative.
+    share : float, callable or str
+        The share of these encounters in which that happens, between 0 and 1: a number, a function
+        of both sizes, or a formula in i and j.
 
     References
     ----------
@@ -38,10 +41,11 @@ class Shattering(PairProcess):
 
     rate: Any
     name: ClassVar[str] = "shattering"
+    variables: ClassVar[Mapping[str, str]] = {"rate": "t", "share": "i and j"}
     outcome: ClassVar[Callable[..., Any]] = staticmethod(_shatter)
 
     def __post_init__(self) -> None:
-        _ = self.factor
+        _ = self.factor, self.shared
 
     @property
     def factor(self) -> TimeFunction:

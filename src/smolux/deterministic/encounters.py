@@ -1,0 +1,154 @@
+"""Sums over pairs, by each law by which processes of pairs take place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels.base import Kernel
+from ..kernels.shared import Shared
+from ..model import Model
+from ..processes.base import PairProcess
+from ..processes.daughters import Merged
+from .lattice import on_multiples
+from .meeting import Meeting
+from .operator import Direct, Operator, OperatorFactory
+
+Float = NDArray[np.float64]
+
+#: the largest window on which low rank gives way to the direct sum
+DIRECT_MOST = 1 << 13
+
+
+def merges(process: PairProcess) -> bool:
+    """Whether two particles become one."""
+    return isinstance(process.daughters, Merged)
+
+
+class Encounters:
+    """The kernel of a model, and its products with the shares that processes have, on a window.
+
+    Parameters
+    ----------
+    model : Model
+    method : str
+        How sums are taken, see `OperatorFactory`.
+    tolerance : float
+        Largest relative error of the entries of a law.
+    unit : int
+        The sizes are ``unit, 2 unit, ...``.
+
+    Attributes
+    ----------
+    laws : list of Kernel
+        One at least; processes with equal shares have one law.
+    merging : list of Kernel
+        Those by which particles merge.
+    """
+
+    def __init__(self, model: Model, method: str, tolerance: float, unit: int = 1) -> None:
+        pairs = [p for p in model.processes if isinstance(p, PairProcess)]
+        shares = [p.shared for p in pairs]
+        different = [s for k, s in enumerate(shares) if s not in shares[:k]] or [None]
+        #: for each process of pairs, which law it has
+        self._of = [different.index(share) for share in shares]
+        self.laws: list[Kernel] = [
+            model.kernel if share is None else Shared(model.kernel, share) for share in different
+        ]
+        merging = {k for k, p in zip(self._of, pairs, strict=True) if merges(p)}
+        self.merging = [self.laws[k] for k in sorted(merging)]
+        self._factories = [
+            OperatorFactory(on_multiples(law, unit), method, tolerance) for law in self.laws
+        ]
+        self._operators: list[Operator] = []
+        self._tilted = False
+
+    @property
+    def notes(self) -> list[str]:
+        """Fallbacks, once each."""
+        return list(dict.fromkeys(text for f in self._factories for text in f.notes))
+
+    @property
+    def direct(self) -> bool:
+        """Whether large windows will need a direct sum."""
+        return any(factory.direct for factory in self._factories)
+
+    def resize(self, count: int) -> None:
+        """Take another number of sizes."""
+        self._operators = [factory(count) for factory in self._factories]
+        self._tilted = False
+
+    @property
+    def name(self) -> str:
+        """How the sums are taken."""
+        return ", ".join(dict.fromkeys(operator.name for operator in self._operators))
+
+    @property
+    def rank(self) -> int:
+        """The highest number of transforms for a density."""
+        return max(operator.rank for operator in self._operators)
+
+    @property
+    def error(self) -> float:
+        """The largest relative error of a law that was found on random pairs."""
+        return max(operator.error for operator in self._operators)
+
+    def prepare(self, n: Float | None) -> None:
+        """Adapt to densities near `n`, shape (M,), or to any."""
+        for operator in self._operators:
+            operator.prepare(n)
+
+    def refine(self, n: Float) -> bool:
+        """Find the sums more exactly near densities `n`; False if there is no way.
+
+        By a tilt of the transforms for these densities; then, on windows where this can be, by the
+        direct sum.
+        """
+        rough = [k for k, each in enumerate(self._operators) if not isinstance(each, Direct)]
+        if not rough or not n.any():
+            return False
+        if not self._tilted:
+            self._tilted = True
+            self.prepare(n)
+            return True
+        if len(n) > DIRECT_MOST or not all(f.may_change for f in self._factories):
+            return False
+        for k in rough:
+            self._operators[k] = self._factories[k].direct_sum(len(n))
+        return True
+
+    def closed(self) -> None:
+        """Note that the terms of a step have added up."""
+        self._tilted = False
+
+    def meet(self, sizes: Float, n: Float) -> list[Meeting]:
+        """Return the encounters of each law, of densities of shape (S, M)."""
+        return [Meeting(operator, sizes, n) for operator in self._operators]
+
+    def law_of(self, p: int) -> int:
+        """Return which law process number `p` has; the first, if it is none of pairs."""
+        return self._of[p] if p < len(self._of) else 0
+
+    def by_law(self, factors: Sequence[float]) -> list[float]:
+        """Return the sums of a number for each process of pairs over those of each law."""
+        sums = [0.0] * len(self.laws)
+        for p, factor in enumerate(factors):
+            sums[self._of[p]] += factor
+        return sums
+
+    def loss(self, weights: Sequence[float], n: Float) -> Float:
+        """Return ``sum_j K(k, j) n_j`` of all laws, each times its weight; shape (M,)."""
+        found = zip(weights, self._operators, strict=True)
+        return np.asarray(sum(w * operator.loss(n[None, :])[0] for w, operator in found))
+
+    def columns(self, weights: Sequence[float], count: int) -> Float:
+        """Return ``K(i, j)`` of all laws for ``j = 1 .. count``, each times its weight."""
+        found = zip(weights, self._operators, strict=True)
+        return np.asarray(sum(w * operator.columns(count) for w, operator in found))
+
+    def beyond(self, weights: Sequence[float], n: Float) -> Float:
+        """Return the gain of the sizes ``M + 1 .. 2 M`` of all laws, each times its weight."""
+        found = zip(weights, self._operators, strict=True)
+        return np.asarray(sum((w * o.beyond(n) for w, o in found if w != 0.0), np.zeros_like(n)))
