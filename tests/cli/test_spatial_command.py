@@ -151,7 +151,7 @@ def test_time_steps_need_times_and_have_settings_of_their_own(folder):
     for change, words in (
         ("spatial.step=0.7", "must lie above 0 and be 0.5 at most"),
         ('spatial.times=["1 s"]', "a box has no units"),
-        ("spatial.times=[2, 1]", "ascending"),
+        ("spatial.times=[2, 1]", "must ascend"),
     ):
         mistakes = call("check", "steps.toml", "--set", change, code=2).stderr
         assert words in mistakes, change

@@ -79,7 +79,8 @@ def test_a_goal_is_about_what_the_result_has() -> None:
         )  # fmt: skip
         group = Group.start(plan, 0, 8)
         group.advance(lambda: False)
-        values, moved = observable(plan, [group])
+        assert plan.goal is not None
+        values, moved = observable(plan, plan.goal, [group])
         ds = to_dataset(plan.model, to_records(plan, [group]))
         np.testing.assert_allclose(values, ds[name].sel(place), rtol=1e-12)
         assert moved.all()

@@ -13,11 +13,12 @@ import runs
 import shared
 import smolux as sx
 from shared import VARYING
-from smolux import plan, resources, room, subvolumes
+from smolux import resources, room, subvolumes
 from smolux.core.state import TIME
 from smolux.errors import InputError, SmoluxWarning
 from smolux.exact import finite
 from smolux.replicas import Group
+from smolux.settings import simulation
 from smolux.subvolumes import Divided
 
 pytestmark = shared.stopped
@@ -122,7 +123,7 @@ def _clusters(remix: float) -> np.ndarray:
 
 @pytest.mark.slow
 def test_mixing_takes_the_bias_away(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plan, "LEAST", 4)
+    monkeypatch.setattr(simulation, "LEAST", 4)
     monkeypatch.setattr(subvolumes, "LEAST", 4)
     exact = finite.number_mean("constant", 16, 2.0)
     apart, mixed = _clusters(10.0), _clusters(0.2)
@@ -140,7 +141,7 @@ def test_fluctuations_are_those_of_the_whole(monkeypatch: pytest.MonkeyPatch) ->
     Mean and variance after two mixings for each particle that is left.
     """
     particles, replicas, end = 400, 60, 2.0
-    for module in (plan, subvolumes):
+    for module in (simulation, subvolumes):
         monkeypatch.setattr(module, "LEAST", 4)
     ds = sx.simulate(
         runs.model(0.0, sx.initial.monodisperse(), c1=0.0), [end], method="acceptance-rejection",
@@ -184,7 +185,7 @@ def test_the_mass_of_open_systems_is_balanced() -> None:
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"subvolumes": 0}, "subvolumes = 0: must be a whole number of at least 1"),
+        ({"subvolumes": 0}, "subvolumes = 0: must be a whole number from 1 to 1024"),
         ({"subvolumes": 5}, "each needs 1000 particles or more"),
         ({"remix": 0.0}, "remix = 0.0: must be a number of collisions for each particle"),
     ],

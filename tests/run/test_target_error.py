@@ -248,12 +248,12 @@ def test_evaporation_without_a_collision_is_something() -> None:
     tally.scalars[..., 2] = 0.0  # collisions
     tally.scalars[..., 5:] = 0.0  # mass that came and left
     group: Any = SimpleNamespace(tally=tally)
-    values, moved = observable(plan, [group])
+    assert plan.goal is not None
+    values, moved = observable(plan, plan.goal, [group])
     assert not moved.any()
     tally.events[0, 0, 1] = 1
-    values, moved = observable(plan, [group])
+    values, moved = observable(plan, plan.goal, [group])
     assert moved.all()
-    assert plan.goal is not None
     assert judge(plan.goal, values, moved).error == np.inf
 
 

@@ -15,6 +15,7 @@ from smolux.case.write import to_toml
 from smolux.initial import INITIALS
 from smolux.kernels import KERNELS
 from smolux.processes import PROCESSES
+from smolux.settings.solution import OBSERVED
 
 #: values for every key of a table; a key of a new law, process or setting belongs here
 KERNEL = {
@@ -23,10 +24,13 @@ KERNEL = {
 OF_TIME, OF_SIZE, OF_PAIR = (0.5, "0.1*exp(-t)"), (1, "k**(1/3)", [0.1, 0.2]), (0.1, "1/(i*j)")
 PROCESS = {
     ("aggregation", "varying"): OF_TIME,
+    ("aggregation", "share"): OF_PAIR,
     ("shattering", "rate"): OF_TIME,
+    ("shattering", "share"): OF_PAIR,
     ("collisional-fragmentation", "rate"): OF_TIME,
     ("collisional-fragmentation", "debris"): (1.5, "1/k", [1, 0.5]),
     ("collisional-fragmentation", "largest"): (2, 100),
+    ("collisional-fragmentation", "share"): OF_PAIR,
     ("evaporation", "rate"): OF_SIZE,
     ("evaporation", "varying"): OF_TIME,
     ("fragmentation", "rate"): OF_PAIR,
@@ -40,13 +44,13 @@ PROCESS = {
 }
 INITIAL = {"density": (1, 2.5), "mean": (3,), "median": (5,), "sigma": (1.3,), "size": (1, 7)}
 SETTINGS = {
-    "particles": (1000,), "replicas": (3,), "seed": (0, 2**70), "method": ("auto",),
+    "particles": (2000,), "replicas": (3,), "seed": (0, 2**70), "method": ("auto",),
     "population": ("fixed-volume",), "orders": ([0, 1.5, 2],), "sizes": (7,),
     "bins_per_octave": (2,),
     "distribution": (True, False), "checkpoint_every": (1, "2 min"), "time_limit": ("1 h", 5),
     "target_error": (), "target": ("M2",), "max_replicas": (20,), "subvolumes": (1, 2),
     "remix": (0.5,), "tolerance": (1e-5,), "window": (100,), "max_window": (200,),
-    "gel": ("inert",),
+    "gel": ("inert",), "check": (True, False),
     "executor": ("threads",), "workers": (2,), "figures": ([], ["clusters"]), "report": (False,),
     # one goes with the other
     "weighting": ("mass-flow", "auto"), "exponent": (), "address": (),
@@ -95,7 +99,10 @@ def tables(draw, kernel, process, initial, si):
     for name, settings_ in (("run", Run), ("solve", Solve)):
         if which in (name, "both"):
             own = drawn(draw, settings_, lambda key: () if key == "times" else SETTINGS[key])
-            case[name] = own if name == "solve" and which == "both" else times | own
+            if name == "solve" and which == "both":
+                case[name] = {key: value for key, value in own.items() if key not in OBSERVED}
+            else:
+                case[name] = times | own
     if "solve" in case and {"window", "max_window"} <= set(case["solve"]):
         del case["solve"]["max_window"]
     for name, settings_ in (("parallel", Parallel), ("output", Output)):

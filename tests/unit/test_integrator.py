@@ -320,7 +320,6 @@ def test_all_mistakes_at_once():
         "did you mean 'reacts'",
         "tolerance = 1.0",
         "window = 2.5",
-        "window = 2.5 and max_window = 100",
         "orders",
         "sizes = 0",
         "must ascend",

@@ -90,11 +90,12 @@ def _read(table_of: Any, table: Table, apart: Sequence[str] = ()) -> dict[str, A
         kind = f.metadata["kind"]
         if f.name in apart:
             continue
+        before = len(table.problems.messages)
         if isinstance(kind, Times):
             value = read_times(table)
         else:
             value = read_key(table, f.name, kind, f.default)
-        if value is not None or f.default is None:
+        if len(table.problems.messages) == before:
             good[f.name] = value
     return good
 

@@ -111,7 +111,8 @@ def disagreements(good: Mapping[str, Any]) -> list[str]:
                 "sub-volumes, or several replicas instead"
             )
             problems.append(Problem("subvolumes", cure, parts))
-    if good.get("target_error") is not None and "replicas" in good:
+    # what is not among the right ones was given
+    if good.get("target_error", 1.0) is not None and "replicas" in good:
         problems += _too_few(good["replicas"], good.get("max_replicas"))
     return problems
 
