@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from .core.state import EVENTS, TRIALS
 from .goal import Goal
 from .methods import SizeClass
+from .observables import recorded
 from .observe import observable
 from .plan import Plan, check_memory, event_cost, with_method
 from .replicas import Group
@@ -125,7 +126,7 @@ def _trial(plan: Plan, small: Plan, weighting: Weighting) -> _Trial | None:
         if _effort(group) > _EFFORT:
             return None
         values.append(observable(small, [group])[0])
-        present.append(group.tally.scalars[..., 3])
+        present.append(recorded(group.tally, "volume").astype(float))
         events += int(group.state.events.sum())
         if effort > _EFFORT // 2:
             break

@@ -23,6 +23,7 @@ from .methods import METHODS, AcceptanceRejection, SizeClass
 from .methods.auto import Auto, Circumstances, choose, costs, unforeseen
 from .methods.base import Method
 from .model import Model
+from .observables import observed
 from .population import POPULATIONS, doubles_at
 from .processes.base import PairProcess
 from .resources import available_memory
@@ -110,7 +111,7 @@ class Plan:
         edges = edges.astype(np.int64)
         octaves = np.int64(1) << np.arange(63)
         before = np.maximum(np.searchsorted(edges, octaves, side="right") - 1, 0)
-        return Grid(np.array(self.times), edges, np.array(orders), before)
+        return observed(np.array(self.times), edges, np.array(orders), before)
 
     def begin(self, workers: int) -> list[tuple[int, int]]:
         """Return the groups to begin with: pilots if there is a goal, else all replicas."""
