@@ -13,6 +13,7 @@ import numpy as np
 import smolux as sx
 from benchmarks.common import group_of, interleaved, loop_seconds, model, table, write_section
 from benchmarks.flat import ballistic_rate, constant_rate, flat_loop, new_sizes, stream
+from smolux.core.state import TRIALS
 
 AR, INVERSE = "acceptance-rejection", "inverse"
 #: kernel, shattering rate, end, particles, repetitions
@@ -51,7 +52,7 @@ def _ours(name: str, shattering: float, end: float, particles: int):  # type: ig
     def measure() -> float:
         group = group_of(physics, end, particles, AR)
         seconds = loop_seconds(group)
-        counts.append((group.events, int(group.state.count[0, 2])))
+        counts.append((group.events, int(group.state.count[0, TRIALS])))
         return 1e9 * seconds / group.events
 
     return measure, counts

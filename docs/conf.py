@@ -22,6 +22,7 @@ extensions = [
     "numpydoc",
     "myst_parser",
     "sphinx_gallery.gen_gallery",
+    "reference_tables",
 ]
 
 exclude_patterns = ["_build", "_ext", "Thumbs.db", "auto_examples/**/README*"]

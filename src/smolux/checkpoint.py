@@ -17,6 +17,7 @@ from .errors import InputError
 from .files import replacing
 from .model import Model
 from .model_dict import model_from_dict, model_to_dict
+from .observables import layout
 from .plan import Plan
 from .replicas import Group
 from .settings import Settings, from_plain, plain
@@ -27,7 +28,8 @@ _UNREADABLE = (
     OSError, EOFError, ValueError, KeyError, TypeError, AttributeError, zipfile.BadZipFile,
 )  # fmt: skip
 
-#: raised whenever the content of a checkpoint changes
+#: raised whenever the content of a checkpoint changes; columns of state and tally speak for
+#: themselves
 VERSION = 5
 
 
@@ -57,7 +59,9 @@ def save(path: str | Path, plan: Plan, groups: Sequence[Group | Divided]) -> Non
         raise InputError("memory ended while sub-volumes were mixed")
     arrays: dict[str, np.ndarray] = {}
     about = [_put(arrays, str(k), group) for k, group in enumerate(groups)]
-    meta = {"version": VERSION, "plan": _plan_to_dict(plan), "groups": about}
+    meta = {
+        "version": VERSION, "layout": layout(), "plan": _plan_to_dict(plan), "groups": about,
+    }  # fmt: skip
     arrays["meta"] = np.frombuffer(json.dumps(meta).encode(), np.uint8)
     with replacing(path) as temporary, temporary.open("wb") as f:
         np.savez(f, **arrays)  # type: ignore[arg-type]
@@ -112,10 +116,12 @@ def load(path: str | Path, model: Model | None = None) -> tuple[Plan, list[Group
         raise InputError(f"checkpoint = {str(path)!r}: there is no such file") from None
     except _UNREADABLE as error:
         raise _damaged(path, error) from error
-    if version != VERSION:
+    if version != VERSION or meta.get("layout") != layout():
+        # a column more or less is another layout of the same version
+        which = f"{VERSION}" if version != VERSION else "it with other columns of the state"
         raise InputError(
             f"checkpoint = {str(path)!r}: has version {version}, this smolux reads "
-            f"{VERSION}; go on with the smolux that wrote it"
+            f"{which}; go on with the smolux that wrote it"
         )
     try:
         if model is not None and model_to_dict(model) != meta["plan"]["model"]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .core.state import DOUBLINGS, EXTINCT
+from . import observables
+from .core.state import AT, DOUBLINGS, HIGHEST
 from .goal import Goal
 from .plan import Plan
 from .records import Records
@@ -16,6 +19,102 @@ from .subvolumes import Divided
 from .totals import Totals, attempts_of
 
 Float = NDArray[np.float64]
+
+
+class Seen:
+    """What groups have seen, by replica and time; NaN where a replica did not come to it."""
+
+    def __init__(self, plan: Plan, groups: Sequence[Group | Divided]) -> None:
+        self.plan, self.groups = plan, groups
+
+    def _tallied(self, name: str) -> NDArray[Any]:
+        return np.concatenate([getattr(g.tally, name) for g in self.groups])
+
+    @cached_property
+    def scalars(self) -> Float:
+        """What is recorded as such, see `smolux.core.state.Tally`."""
+        return self._tallied("scalars").astype(float, copy=False)
+
+    @cached_property
+    def missing(self) -> NDArray[np.bool_]:
+        """Where nothing is recorded."""
+        return np.isnan(self.scalars[..., AT])
+
+    def recorded(self, name: str) -> Float:
+        """Return an observable that is a column of the state, as it was recorded."""
+        found = [observables.recorded(g.tally, name) for g in self.groups]
+        values = np.concatenate(found).astype(float)
+        values[self.missing] = np.nan
+        return values
+
+    @cached_property
+    def volume(self) -> Float:
+        """Simulated volume."""
+        return self.recorded("volume")
+
+    @cached_property
+    def sizes(self) -> Float:
+        """Sizes that are counted one by one."""
+        return np.arange(1, self.plan.sizes + 1, dtype=float)
+
+    @cached_property
+    def stood(self) -> Float:
+        """What the particles of each of these stand for."""
+        return self._tallied("counts")[:, :, 1:] * self.plan.weighting.stands_for(self.sizes)
+
+    @cached_property
+    def bins(self) -> Float:
+        """What those of other sizes stand for, by bins."""
+        return self._tallied("bins").astype(float, copy=False)
+
+    @cached_property
+    def used(self) -> int:
+        """How many bins there are up to the last in which anything was seen."""
+        return int(np.max(np.nonzero(self.bins.any(axis=(0, 1)))[0], initial=-1)) + 1
+
+    @cached_property
+    def sums(self) -> Float:
+        """Sums of powers of those sizes."""
+        return self._tallied("sums").astype(float, copy=False)
+
+    @cached_property
+    def attempts(self) -> Float:
+        """Candidates for each process up to the end."""
+        return attempts_of(self.plan, self.groups)
+
+    def number_density(self) -> Float:
+        """Return what there is of all sizes for a unit of volume."""
+        if self.plan.weighting.weight is None:
+            return self.recorded("particles") / self.volume
+        weights = self.plan.weighting.stands_for(self.sizes)
+        stood = [
+            g.tally.counts[:, :, 1:] @ weights + g.tally.bins.sum(axis=-1) for g in self.groups
+        ]
+        return np.asarray(np.concatenate(stood) / self.volume)
+
+    def moment(self) -> Float:
+        """Return the moments; whole numbers until the last step, so that the mass is exact."""
+        powers = self.sizes[:, None] ** np.array(self.plan.orders)
+        sums = self.sums[..., : len(self.plan.orders)]
+        return (self.stood @ powers + sums) / self.volume[..., None]
+
+    def mass(self) -> Float:
+        """Return the mass in the simulated volume, for which the grid has the last sum."""
+        return np.where(self.missing, np.nan, self.stood @ self.sizes + self.sums[..., -1])
+
+
+#: observables that are no column of the state
+COMPUTED: dict[str, Callable[[Seen], Float]] = {
+    "number_density": Seen.number_density,
+    "moment": Seen.moment,
+    "largest": lambda seen: seen.scalars[..., HIGHEST],
+    "n": lambda seen: seen.stood / seen.volume[..., None],
+    "n_bin": lambda seen: seen.bins[:, :, : seen.used] / seen.volume[..., None],
+    "attempts": lambda seen: seen.attempts,
+    "mass": Seen.mass,
+}
+#: observables of systems that are open alone
+_OPEN = ("mass", "mass_in", "mass_out")
 
 
 def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
@@ -27,58 +126,29 @@ def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
     groups : sequence of Group
         In the order of their replicas.
     """
-    scalars = np.concatenate([g.tally.scalars for g in groups])
-    _, particles, collisions, volume, largest, come, gone = np.moveaxis(scalars, -1, 0)
-    missing = np.isnan(volume)
-    counts = np.concatenate([g.tally.counts for g in groups])[:, :, 1:]
-    bins = np.concatenate([g.tally.bins for g in groups])
-    used = int(np.max(np.nonzero(bins.any(axis=(0, 1)))[0], initial=-1)) + 1
-    sizes = np.arange(1, plan.sizes + 1, dtype=float)
-    weights = plan.weighting.stands_for(sizes)
-    v = volume[..., None]  # NaN where missing, so that all that follows is too
-    stood = counts * weights
-    sums = np.concatenate([g.tally.sums for g in groups])
-    powers = sizes[:, None] ** np.array(plan.orders)
-    inside = np.where(missing, np.nan, stood @ sizes + sums[..., -1])
-    sums = sums[..., : len(plan.orders)]
-    events = np.concatenate([g.tally.events for g in groups]).astype(float)
-    events[missing] = np.nan
-    clock = np.concatenate([g.state.clock for g in groups])
+    seen, values = Seen(plan, groups), {}
+    for o in observables.OBSERVABLES:
+        if o.name in _OPEN and not plan.model.open:
+            continue
+        if o.name in COMPUTED:
+            values[o.name] = COMPUTED[o.name](seen)
+        elif o.recorded:
+            values[o.name] = seen.recorded(o.name)
+        else:
+            values[o.name] = np.concatenate([o.ended(g.state) for g in groups]).astype(float)
     edges = plan.grid.edges.astype(float)
-    attempts = attempts_of(plan, groups)
     return Records(
         times=np.array(plan.times),
         orders=np.array(plan.orders),
         processes=tuple(process.name for process in plan.model.processes),
-        bin_edges=np.append(edges, 2.0**62)[: used + 1],
-        number_density=_number_density(plan, groups, particles, volume),
-        largest=largest,
-        particles=particles,
-        collisions=collisions,
-        volume=volume,
-        moment=(stood @ powers + sums) / v,  # whole numbers until here: the mass is exact
-        n=stood / v,
-        n_bin=bins[:, :, :used] / v,
-        events=events,
-        attempts=attempts,
-        extinction_time=clock[:, EXTINCT],
+        bin_edges=np.append(edges, 2.0**62)[: seen.used + 1],
+        values=values,
         distribution=[rows for g in groups for rows in g.distribution]
         if plan.distribution
         else None,
-        balance=(inside, come, gone) if plan.model.open else None,
         attributes=_attributes(plan, groups),
-        warnings=Totals.of(groups, attempts).warnings(plan),
+        warnings=Totals.of(groups, seen.attempts).warnings(plan),
     )
-
-
-def _number_density(
-    plan: Plan, groups: Sequence[Group | Divided], particles: Float, volume: Float
-) -> Float:
-    if plan.weighting.weight is None:
-        return particles / volume
-    weights = plan.weighting.stands_for(np.arange(1.0, plan.sizes + 1.0))
-    stood = [g.tally.counts[:, :, 1:] @ weights + g.tally.bins.sum(axis=-1) for g in groups]
-    return np.asarray(np.concatenate(stood) / volume)
 
 
 def observable(
@@ -92,23 +162,23 @@ def observable(
     moved : ndarray of bool, shape (T,)
         Whether anything has happened in any replica.
     """
-    scalars = np.concatenate([g.tally.scalars for g in groups])
-    _, particles, collisions, volume, largest, come, gone = np.moveaxis(scalars, -1, 0)
-    values = _number_density(plan, groups, particles, volume)
+    seen = Seen(plan, groups)
     if goal.target == "largest":
-        values = largest
+        values = seen.scalars[..., HIGHEST]
     elif goal.size is not None:
         count = np.concatenate([g.tally.counts[:, :, goal.size] for g in groups])
-        values = count * plan.weighting.stands_for(np.array([float(goal.size)])) / volume
+        values = count * plan.weighting.stands_for(np.array([float(goal.size)])) / seen.volume
     elif goal.order is not None:
-        sizes = np.arange(1, plan.sizes + 1, dtype=float)
-        powers = sizes**goal.order * plan.weighting.stands_for(sizes)
+        powers = seen.sizes**goal.order * plan.weighting.stands_for(seen.sizes)
         column = plan.orders.index(goal.order)
         sums = [g.tally.counts[:, :, 1:] @ powers + g.tally.sums[..., column] for g in groups]
-        values = np.concatenate(sums) / volume
-    events = np.concatenate([g.tally.events for g in groups])
+        values = np.concatenate(sums) / seen.volume
+    else:
+        values = seen.number_density()
+    events, collisions = seen.recorded("events"), seen.recorded("collisions")
+    come, gone = seen.recorded("mass_in"), seen.recorded("mass_out")
     moved = (collisions > 0) | (events > 0).any(axis=-1) | (come > 0) | (gone > 0)
-    return values, moved.any(axis=0)
+    return values, np.asarray(moved.any(axis=0))
 
 
 def _attributes(plan: Plan, groups: Sequence[Group | Divided]) -> dict[str, object]:

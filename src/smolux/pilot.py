@@ -20,6 +20,7 @@ from .costing import event_cost
 from .goal import Goal
 from .methods import SizeClass
 from .model import Model
+from .observables import recorded
 from .observe import observable
 from .plan import Plan
 from .replicas import Group
@@ -126,7 +127,7 @@ def _trial(small: Plan, goal: Goal, meant: Plan) -> _Trial | None:
         if _effort(group) > _EFFORT:
             return None
         values.append(observable(small, goal, [group])[0])
-        present.append(group.tally.scalars[..., 3])
+        present.append(recorded(group.tally, "volume").astype(float))
         events += int(group.state.events.sum())
         if effort > _EFFORT // 2:
             break

@@ -17,6 +17,7 @@ from .goal import Goal
 from .initial import Initial
 from .methods.base import Method, Rates
 from .model import Model
+from .observables import observed
 from .population import doubles_at
 from .resources import available_memory
 from .settings import PILOT, Settings
@@ -126,7 +127,7 @@ class Plan(Settings):
         edges = edges.astype(np.int64)
         octaves = np.int64(1) << np.arange(63)
         before = np.maximum(np.searchsorted(edges, octaves, side="right") - 1, 0)
-        return Grid(np.array(self.times), edges, np.array(orders), before)
+        return observed(np.array(self.times), edges, np.array(orders), before)
 
     def begin(self, workers: int) -> list[tuple[int, int]]:
         """Return the groups to begin with: pilots if there is a goal, else all replicas."""

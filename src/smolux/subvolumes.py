@@ -25,16 +25,12 @@ from .core.state import (
     DOUBLINGS,
     EVENTS,
     EXCESS,
+    EXTENSIVE,
     EXTINCT,
     FLOOR,
-    MASS_IN,
-    MASS_OUT,
     NEXT,
     PARTICLES,
-    RAISED,
-    REPAIRS,
     TIME,
-    TRIALS,
     VOLUME,
     WINDOW,
     WORST_I,
@@ -42,9 +38,12 @@ from .core.state import (
     State,
     Tally,
     Windows,
+    bring_together,
+    hand_on,
     new_tally,
 )
 from .methods.base import merged, size_of
+from .observables import add_up
 from .plan import Plan
 from .processes.base import PairProcess
 from .replicas import Group, empty_state, initial_populations
@@ -183,9 +182,8 @@ class Divided:
             words = stream(plan.seed, self.first, _PART, self.stretch, k)
             state = empty_state(plan, words[None])
             work = method.collect(rates, [given[k] for given in piles], state, plan.mass)
-            state.clock[0, (TIME, VOLUME, FLOOR)] = start, clock[VOLUME] / used, clock[FLOOR]
-            state.clock[0, EXCESS] = clock[EXCESS]
-            state.clock[0, RAISED:] = clock[RAISED:]
+            hand_on(self.state, state)
+            state.clock[0, (TIME, VOLUME, EXCESS)] = start, clock[VOLUME] / used, clock[EXCESS]
             state.count[0, WINDOW] = window
             method.use(work, state, learnt)
             known = parameters[k] if k < len(parameters) else None
@@ -211,7 +209,7 @@ class Divided:
         clock, count = self.state.clock[0], self.state.count[0]
         count[PARTICLES] *= copies
         count[DOUBLINGS] += copies.bit_length() - 1
-        clock[[VOLUME, MASS_IN, MASS_OUT]] *= float(copies)
+        clock[[*EXTENSIVE]] *= float(copies)
         if copies > 1:
             clock[EXTINCT] = np.nan
 
@@ -219,14 +217,7 @@ class Divided:
         """Add up what the sub-volumes recorded at the output times of this stretch."""
         first = int(self.state.count[0, NEXT])
         rows = slice(first, first + due)
-        for name, values in self.tally._asdict().items():
-            values[0, rows] = sum(getattr(part.tally, name)[0, :due] for part in self.parts)
-        scalars = np.array([part.tally.scalars[0, :due] for part in self.parts])
-        self.tally.scalars[0, rows, 0] = scalars[0, :, 0]
-        self.tally.scalars[0, rows, 2] += self.state.count[0, EVENTS]
-        self.tally.scalars[0, rows, 4] = scalars[:, :, 4].max(axis=0)
-        self.tally.scalars[0, rows, 5:7] += self.state.clock[0, [MASS_IN, MASS_OUT]]
-        self.tally.events[0, rows] += self.state.events[0]
+        add_up(self.tally, rows, [part.tally for part in self.parts], self.state)
         for k in range(due if self.plan.distribution else 0):
             self.distribution[0].append(merged([part.distribution[0][k] for part in self.parts]))
         self.state.count[0, NEXT] += due
@@ -234,29 +225,22 @@ class Divided:
     def _add_up(self, end: float) -> None:
         """Bring the state of the whole up to the end of the stretch, and plan the next."""
         clock, count = self.state.clock[0], self.state.count[0]
-        counts = sum(part.state.count[0] for part in self.parts)
-        count[[EVENTS, TRIALS, REPAIRS]] += counts[[EVENTS, TRIALS, REPAIRS]]
-        count[PARTICLES] = counts[PARTICLES]
-        for part in self.parts:
-            if part.state.clock[0, FLOOR] > clock[FLOOR]:
-                clock[FLOOR] = part.state.clock[0, FLOOR]
-                count[[WORST_I, WORST_J]] = part.state.count[0, [WORST_I, WORST_J]]
-            # that and what follows: by how much bounds were raised
-            np.maximum(clock[RAISED:], part.state.clock[0, RAISED:], out=clock[RAISED:])
-            self.state.events[0] += part.state.events[0]
-            self.state.attempts[0] += part.state.attempts[0]
-            self.state.missed[0] += part.state.missed[0]
-            clock[[MASS_IN, MASS_OUT]] += part.state.clock[0, [MASS_IN, MASS_OUT]]
-            self.seconds += part.seconds
-            self.bounds_seconds += part.bounds_seconds
+        states = [part.state for part in self.parts]
+        worst = max(states, key=lambda state: state.clock[0, FLOOR])
+        if worst.clock[0, FLOOR] > clock[FLOOR]:
+            count[[WORST_I, WORST_J]] = worst.count[0, [WORST_I, WORST_J]]
+        before = count[EVENTS]
+        bring_together(self.state, states)
+        self.seconds += sum(part.seconds for part in self.parts)
+        self.bounds_seconds += sum(part.bounds_seconds for part in self.parts)
         clock[EXCESS] = clock[CLOCKS:].sum()
         if count[PARTICLES] == 1 and np.isnan(clock[EXTINCT]):
             clock[EXTINCT] = self.parts[0].state.clock[0, EXTINCT]
         elapsed, clock[TIME] = end - clock[TIME], end
         self.stretch += 1
         self.length = 2.0 * elapsed
-        if counts[EVENTS]:
-            wanted = self.plan.remix * counts[PARTICLES] / counts[EVENTS]
+        if count[EVENTS] > before:
+            wanted = self.plan.remix * count[PARTICLES] / (count[EVENTS] - before)
             self.length = min(self.length, wanted * elapsed)
         if count[NEXT] == len(self.plan.times):
             self.codes[0] = DONE

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .core.splits import EXACT
 from .core.state import (
+    AT,
     BY_FACTOR,
     BY_KERNEL,
     BY_SPLITS,
@@ -91,12 +92,12 @@ class Totals:
         """Add up groups; the `attempts` are those of `attempts_of`."""
         clock = np.concatenate([g.state.clock for g in groups])
         count = np.concatenate([g.state.count for g in groups])
-        volume = np.concatenate([g.tally.scalars[..., 3] for g in groups])
+        recorded = np.concatenate([g.tally.scalars[..., AT] for g in groups])
         worst = int(clock[:, FLOOR].argmax())
         extinct = clock[np.isfinite(clock[:, EXTINCT]), EXTINCT]
         return cls(
             len(clock),
-            int(np.isnan(volume).any(axis=1).sum()),
+            int(np.isnan(recorded).any(axis=1).sum()),
             int(count[:, EVENTS].sum()),
             int(count[:, TRIALS].sum()),
             int(count[:, REPAIRS].sum()),

@@ -103,7 +103,7 @@ def trajectories(case: str, budget: int = 1000) -> list[dict[str, Any]]:
         found.append(
             {
                 "population": checksum(*(np.asarray(a, np.int64) for a in sizes)),
-                "counted": checksum(group.tally.counts[r], group.tally.events[r]),
+                "counted": checksum(group.tally.counts[r], group.tally.processes[r]),
                 "events": state.events[r].tolist(),
                 "candidates": int(state.count[r, TRIALS]),
                 "attempts": state.attempts[r].tolist(),

@@ -19,6 +19,7 @@ from smolux.confidence import Sample, mean_interval
 from smolux.core.state import new_tally
 from smolux.errors import InputError, SmoluxWarning
 from smolux.goal import Goal, Trial, judge, plan_replicas
+from smolux.observables import recorded
 from smolux.observe import observable
 from smolux.planning import make_plan
 
@@ -245,13 +246,13 @@ def test_evaporation_without_a_collision_is_something() -> None:
     )
     tally = new_tally(8, plan.grid, 4, 2)
     tally.scalars[:] = 1.0
-    tally.scalars[..., 2] = 0.0  # collisions
-    tally.scalars[..., 5:] = 0.0  # mass that came and left
+    for name in ("collisions", "mass_in", "mass_out"):
+        recorded(tally, name)[:] = 0.0
     group: Any = SimpleNamespace(tally=tally)
     assert plan.goal is not None
     values, moved = observable(plan, plan.goal, [group])
     assert not moved.any()
-    tally.events[0, 0, 1] = 1
+    recorded(tally, "events")[0, 0, 1] = 1
     values, moved = observable(plan, plan.goal, [group])
     assert moved.all()
     assert judge(plan.goal, values, moved).error == np.inf

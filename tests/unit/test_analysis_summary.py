@@ -27,16 +27,18 @@ def repeated(replicas, columns=2000, seed=5):
         orders=np.arange(4.0),
         processes=(),
         bin_edges=np.array([1.0]),
-        number_density=2 / (times + 2) * (1 + 0.01 * noise),
-        largest=ones,
-        particles=ones,
-        collisions=ones,
-        volume=ones,
-        moment=moment,
-        n=none,
-        n_bin=none,
-        events=none,
-        extinction_time=np.full(replicas, np.nan),
+        values={
+            "number_density": 2 / (times + 2) * (1 + 0.01 * noise),
+            "largest": ones,
+            "particles": ones,
+            "collisions": ones,
+            "volume": ones,
+            "moment": moment,
+            "n": none,
+            "n_bin": none,
+            "events": none,
+            "extinction_time": np.full(replicas, np.nan),
+        },
     )
     return to_dataset(synthetic.model(), records)
 

@@ -45,8 +45,8 @@ def dataset(times, scale=1.0, **settings):
     records = synthetic.constant_kernel(
         particles=200, replicas=3, times=times, units=units, **settings
     )
-    records.number_density *= scale
-    records.moment *= scale
+    records.values["number_density"] *= scale
+    records.values["moment"] *= scale
     return sx.results.to_dataset(synthetic.model(), records)
 
 

@@ -55,11 +55,12 @@ def test_bins_hold_whole_sizes(ds):
 def test_edges_between_sizes_and_no_bins():
     records = synthetic.constant_kernel(particles=100, replicas=2)
     records.bin_edges = np.array([64.5, 70.2, 100.0, np.inf])
-    records.n_bin = records.n_bin[:, :, :3]
+    records.values["n_bin"] = records.values["n_bin"][:, :, :3]
     ds = results.to_dataset(synthetic.model(), records)
     # sizes 65 .. 70, 71 .. 99, 100 ...
     assert ds["bin_width"].values.tolist() == [6, 29, np.inf]
-    records.bin_edges, records.n_bin = np.array([65.0]), records.n_bin[:, :, :0]
+    records.bin_edges = np.array([65.0])
+    records.values["n_bin"] = records.values["n_bin"][:, :, :0]
     assert results.to_dataset(synthetic.model(), records).sizes["bin"] == 0
 
 

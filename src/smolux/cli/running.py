@@ -22,20 +22,13 @@ from ..deterministic.solver import solve
 from ..errors import InputError, Interrupted, OutOfMemoryError, WorkerError, quiet
 from ..executors import opened
 from ..model_dict import model_to_dict
+from ..observables import units
 from ..settings import Settings
 from . import figures, report
 from .console import duration, say
 from .progress import Display
 from .rundir import RunDirectory
 from .signals import Stopper
-
-#: units of the variables of a case in SI units; all others are plain numbers
-_SI = {
-    "time": "s",
-    "extinction_time": "s",
-    "volume": "m3",
-    **dict.fromkeys(("number_density", "moment", "n", "n_bin"), "m-3"),
-}
 
 
 @dataclass
@@ -264,8 +257,8 @@ def _store(ds: Any, case: Case, file: Path) -> None:
     if case.title:
         ds.attrs["title"] = case.title
     if case.si:
-        for name, unit in _SI.items():
-            if name in ds.variables:
+        for name, unit in units().items():
+            if "units" in ds.get(name, ds).attrs:
                 ds[name].attrs["units"] = unit
     try:
         results.save(ds, file)

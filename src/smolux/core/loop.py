@@ -37,14 +37,13 @@ from .state import (
     DRAW,
     EVENTS,
     EXCESS,
+    EXTENSIVE,
     EXTINCT,
     FIRE,
     FIRST,
     GROW,
     IN_DOUBT,
     LIMIT,
-    MASS_IN,
-    MASS_OUT,
     NEXT,
     PARTICLES,
     PAUSE,
@@ -56,11 +55,9 @@ from .state import (
     TIME,
     TOO_LARGE,
     TRIALS,
-    VOLUME,
     WINDOW,
-    State,
-    Tally,
 )
+from .views import state_of, tally_of
 
 #: candidates looked at before the loop may return without an event
 PATIENCE = 4096
@@ -307,9 +304,8 @@ def make_loop(
                 while 0 < s.count[PARTICLES] <= s.count[DOUBLE_AT]:
                     if not double(s, w):
                         return GROW
-                    s.clock[VOLUME] *= 2.0
-                    s.clock[MASS_IN] *= 2.0
-                    s.clock[MASS_OUT] *= 2.0
+                    for column in EXTENSIVE:
+                        s.clock[column] *= 2.0
                     s.count[DOUBLINGS] += 1
                     s.clock[EXTINCT] = math.nan
                     if s.held.shape[0] > 0:
@@ -329,20 +325,7 @@ def make_loop(
                 s.count[NEXT] < grid.times.shape[0] and grid.times[s.count[NEXT]] < s.clock[PENDING]
             ):
                 k = s.count[NEXT]
-                record(
-                    s,
-                    w,
-                    Tally(
-                        tally.scalars[k],
-                        tally.events[k],
-                        tally.counts[k],
-                        tally.bins[k],
-                        tally.sums[k],
-                    ),
-                    grid,
-                    grid.times[k],
-                    p,
-                )
+                record(s, w, tally_of(tally, k), grid, grid.times[k], p)
                 s.count[NEXT] += 1
                 if s.count[PAUSE] == 1:
                     return PAUSED
@@ -359,22 +342,7 @@ def make_loop(
             if budget <= 0:
                 codes[r] = BUDGET
                 continue
-            s = State(
-                state.rng[r],
-                state.clock[r],
-                state.count[r],
-                state.events[r],
-                state.sizes[r],
-                state.counts[r],
-                state.attempts[r],
-                state.held[r],
-                state.most[r],
-                state.sums[r],
-                state.missed[r],
-            )
-            t = Tally(
-                tally.scalars[r], tally.events[r], tally.counts[r], tally.bins[r], tally.sums[r]
-            )
+            s, t = state_of(state, r), tally_of(tally, r)
             before = s.count[TRIALS] + s.count[EVENTS]
             codes[r] = advance(s, view(work, r), t, windows, grid, p, q, budget)
             budget -= s.count[TRIALS] + s.count[EVENTS] - before

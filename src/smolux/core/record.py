@@ -8,7 +8,10 @@ from typing import Any
 
 from .compile import cold_piece, piece
 from .slots import octave
-from .state import EVENTS, MASS_IN, MASS_OUT, PARTICLES, VOLUME
+from .state import AT, HIGHEST, PER_PROCESS, SCALARS
+
+#: in `PER_PROCESS`
+_ATTEMPTS = PER_PROCESS.index("attempts")
 
 
 @piece
@@ -50,14 +53,18 @@ def make_record(visit: Callable[..., Any]) -> Callable[..., Any]:
 
     @cold_piece
     def record(s, w, t, grid, time, p):
-        t.scalars[0] = time
-        t.scalars[1] = s.count[PARTICLES]
-        t.scalars[2] = s.count[EVENTS]
-        t.scalars[3] = s.clock[VOLUME]
-        t.scalars[4] = visit(s, w, t, grid, p)
-        t.scalars[5] = s.clock[MASS_IN]
-        t.scalars[6] = s.clock[MASS_OUT]
-        for r in range(s.events.shape[0]):
-            t.events[r] = s.events[r]
+        t.scalars[AT] = time
+        t.scalars[HIGHEST] = visit(s, w, t, grid, p)
+        k = SCALARS
+        for column in grid.counted:
+            t.scalars[k] = s.count[column]
+            k += 1
+        for column in grid.clocked:
+            t.scalars[k] = s.clock[column]
+            k += 1
+        for m in range(grid.processes.shape[0]):
+            attempts = grid.processes[m] == _ATTEMPTS
+            for r in range(s.events.shape[0]):
+                t.processes[m, r] = s.attempts[r] if attempts else s.events[r]
 
     return record

@@ -2,62 +2,89 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 
-# Entries of State.count.
-PARTICLES = 0  # simulated particles
-EVENTS = 1  # collisions so far
-TRIALS = 2  # candidates looked at so far
-NEXT = 3  # next output time
-PHASE = 4  # DRAW or FIRE: whether an event is pending
-FIRST = 5  # slots of the pending pair; FIRST < 0: nothing happens then
-SECOND = 6
-PROCESS = 7  # process of the pending event, -1 until chosen
-WINDOW = 8  # window of time in which the rate factors are bounded
-DOUBLE_AT = 9  # double the volume when this few particles are left; 0: never
-DOUBLINGS = 10
-SMALLEST = 11  # bounds of the sizes present
-LARGEST = 12
-SINCE = 13  # collisions since these bounds were taken
-MONOMERS = 14  # what a store keeps beside its arrays
-STORED = 15
-PAUSE = 16  # 1: return at every output time
-REPAIRS = 17  # rates found above their bound
-WORST_I = 18  # sizes of the latest such pair, or of a rate that is no rate
-WORST_J = 19
-KIND = 20  # of the pending event, see `smolux.core.beside`
-LONE = 21  # the single particle of the pending event, its size, its process, one of two fragments
-LONE_SIZE = 22
-LONE_PROCESS = 23
-LONE_PART = 24
-CULPRIT = 25  # whose rate is no rate: 0 the kernel, r + 1 process r of single particles
-WANTED = 26  # the size of which the splits are to be bounded
-VAIN = 27  # candidates of single particles in vain since all were counted
-LATE = 28  # 1: encounters are drawn after what else may come first, see `smolux.core.beside`
-COUNTS = 29
+from .columns import Columns, Rule, merged
 
-# Entries of State.clock.
-TIME = 0  # of the latest event
-PENDING = 1  # time of the next event
-VOLUME = 2
-EXTINCT = 3  # when one particle was left; NaN before
-MAJORANT = 4  # bound of the rate over the sizes present
-FLOOR = 5  # least majorant, raised by repairs
-VALUE = 6  # the value that broke a bound
-EXCESS = 7  # sum of what follows
-MASS_IN = 8  # what sources have brought in, and what has left, in the volume of now
-MASS_OUT = 9
-RAISED = 10  # by which share bounds of splits were found too low
-CLOCKS = 11  # from here on, for each process: what repairs have added to the bounds of its factor
+#: columns of `State.count`, of `State.clock` and of `State.missed`: a call declares the next one
+_count, _clock, _missed = Columns(), Columns(), Columns()
 
-# Entries of State.missed.
-IN_DOUBT = 0  # what the pending encounter adds to what follows, should it take place
-SPLIT_IN_DOUBT = 1  # the same of a single particle that splits
-BY_KERNEL = 2
-BY_SPLITS = 3
-BY_FACTOR = 4  # from here on, for each process: by the bounds of its factor
+PARTICLES = _count("particles", Rule.SUM)  # simulated particles
+EVENTS = _count("events", Rule.ADDED)  # collisions so far
+TRIALS = _count("trials", Rule.ADDED)  # candidates looked at so far
+NEXT = _count("next", Rule.WHOLE)  # next output time
+PHASE = _count("phase", Rule.APART)  # DRAW or FIRE: whether an event is pending
+FIRST = _count("first", Rule.APART)  # slots of the pending pair; FIRST < 0: nothing happens then
+SECOND = _count("second", Rule.APART)
+PROCESS = _count("process", Rule.APART)  # process of the pending event, -1 until chosen
+WINDOW = _count("window", Rule.APART)  # window of time in which the rate factors are bounded
+#: double the volume when this few particles are left; 0: never
+DOUBLE_AT = _count("double_at", Rule.APART)
+DOUBLINGS = _count("doublings", Rule.WHOLE)
+SMALLEST = _count("smallest", Rule.APART)  # bounds of the sizes present
+LARGEST = _count("largest", Rule.APART)
+SINCE = _count("since", Rule.APART)  # collisions since these bounds were taken
+MONOMERS = _count("monomers", Rule.APART)  # what a store keeps beside its arrays
+STORED = _count("stored", Rule.APART)
+PAUSE = _count("pause", Rule.APART)  # 1: return at every output time
+REPAIRS = _count("repairs", Rule.ADDED)  # rates found above their bound
+WORST_I = _count(
+    "worst_i", Rule.WHOLE
+)  # sizes of the latest such pair, or of a rate that is no rate
+WORST_J = _count("worst_j", Rule.WHOLE)
+KIND = _count("kind", Rule.APART)  # of the pending event, see `smolux.core.beside`
+#: the single particle of the pending event, its size, its process, one of two fragments
+LONE = _count("lone", Rule.APART)
+LONE_SIZE = _count("lone_size", Rule.APART)
+LONE_PROCESS = _count("lone_process", Rule.APART)
+LONE_PART = _count("lone_part", Rule.APART)
+#: whose rate is no rate: 0 the kernel, r + 1 process r of single particles
+CULPRIT = _count("culprit", Rule.APART)
+WANTED = _count("wanted", Rule.APART)  # the size of which the splits are to be bounded
+VAIN = _count("vain", Rule.APART)  # candidates of single particles in vain since all were counted
+#: 1: encounters are drawn after what else may come first, see `smolux.core.beside`
+LATE = _count("late", Rule.APART)
+COUNTS = len(_count)
+
+TIME = _clock("time", Rule.WHOLE)  # of the latest event
+PENDING = _clock("pending", Rule.APART)  # time of the next event
+VOLUME = _clock("volume", Rule.WHOLE, extensive=True)
+EXTINCT = _clock("extinct", Rule.WHOLE)  # when one particle was left; NaN before
+MAJORANT = _clock("majorant", Rule.APART)  # bound of the rate over the sizes present
+FLOOR = _clock("floor", Rule.MAXIMUM)  # least majorant, raised by repairs
+VALUE = _clock("value", Rule.APART)  # the value that broke a bound
+EXCESS = _clock("excess", Rule.WHOLE)  # sum of `factors`
+#: what sources have brought in, and what has left, in the volume of now
+MASS_IN = _clock("mass_in", Rule.ADDED, extensive=True)
+MASS_OUT = _clock("mass_out", Rule.ADDED, extensive=True)
+RAISED = _clock("raised", Rule.MAXIMUM)  # by which share bounds of splits were found too low
+#: what repairs have added to the bounds of the factor of each process
+CLOCKS = _clock("factors", Rule.MAXIMUM, each=True)
+
+IN_DOUBT = _missed(
+    "in_doubt", Rule.APART
+)  # what the pending encounter adds to the next, if it comes
+SPLIT_IN_DOUBT = _missed("split_in_doubt", Rule.APART)  # the same of a single particle that splits
+BY_KERNEL = _missed("by_kernel", Rule.ADDED)
+BY_SPLITS = _missed("by_splits", Rule.ADDED)
+BY_FACTOR = _missed(
+    "by_factor", Rule.ADDED, each=True
+)  # by the bounds of the factor of each process
+
+#: what grows with the volume
+EXTENSIVE = tuple(_clock.extensive)
+COLUMNS = {"count": _count, "clock": _clock, "missed": _missed}
+
+#: scalars of a `Tally`: the time, and the largest size; behind them what `Grid` names
+TALLIED = Columns()
+AT = TALLIED("time", Rule.FIRST)
+HIGHEST = TALLIED("largest", Rule.MAXIMUM)
+SCALARS = len(TALLIED)
+#: arrays of the state with an entry for each process that can be observed
+PER_PROCESS = ("events", "attempts")
 
 #: sizes stay below this, so that a sum of two cannot overflow
 LIMIT = 1 << 62
@@ -107,17 +134,41 @@ class State(NamedTuple):
         `smolux.core.bounds.repair`.
     """
 
-    rng: np.ndarray
-    clock: np.ndarray
-    count: np.ndarray  # type: ignore[assignment]
-    events: np.ndarray
-    sizes: np.ndarray
-    counts: np.ndarray
-    attempts: np.ndarray
-    held: np.ndarray
-    most: np.ndarray
-    sums: np.ndarray
-    missed: np.ndarray
+    rng: Annotated[np.ndarray, Rule.APART]
+    clock: Annotated[np.ndarray, _clock]
+    count: Annotated[np.ndarray, _count]  # type: ignore[assignment]
+    events: Annotated[np.ndarray, Rule.ADDED]
+    sizes: Annotated[np.ndarray, Rule.APART]
+    counts: Annotated[np.ndarray, Rule.APART]
+    attempts: Annotated[np.ndarray, Rule.ADDED]
+    held: Annotated[np.ndarray, Rule.APART]
+    most: Annotated[np.ndarray, Rule.APART]
+    sums: Annotated[np.ndarray, Rule.APART]
+    missed: Annotated[np.ndarray, _missed]
+
+
+#: how each of these arrays of sub-volumes makes that of the whole
+RULES: dict[str, Rule | Columns] = {
+    name: hint.__metadata__[0] for name, hint in get_type_hints(State, include_extras=True).items()
+}
+
+
+def bring_together(whole: State, parts: Sequence[State]) -> None:
+    """Bring the state of a replica up to date with those of its sub-volumes."""
+    for name, how in RULES.items():
+        mine, theirs = getattr(whole, name)[0], [getattr(part, name)[0] for part in parts]
+        if isinstance(how, Columns):
+            how.merge(mine, theirs)
+        else:
+            mine[:] = merged(how, mine, theirs)
+
+
+def hand_on(whole: State, part: State) -> None:
+    """Let a sub-volume begin with the maxima that the whole knows."""
+    for name, columns in COLUMNS.items():
+        mine, its = getattr(whole, name)[0], getattr(part, name)[0]
+        at = columns.under(Rule.MAXIMUM, len(mine))
+        its[at] = mine[at]
 
 
 class Windows(NamedTuple):
@@ -174,9 +225,11 @@ class Tally(NamedTuple):
 
     Attributes
     ----------
-    scalars : float64 array of shape (R, T, 7)
-        Time recorded, particles, collisions, volume, largest size, mass that came in and left.
-    events : int64 array of shape (R, T, P)
+    scalars : float64 array of shape (R, T, SCALARS + ...)
+        Time and largest size, then the columns of `State.count` and `State.clock` that are
+        observed, see `Grid`.
+    processes : int64 array of shape (R, T, M, P)
+        The M arrays of the state with an entry for each process that are observed.
     counts : int64 array of shape (R, T, L + 1)
         Particles of the sizes ``1 .. L``; entry 0 is unused.
     bins : float64 array of shape (R, T, B)
@@ -186,22 +239,27 @@ class Tally(NamedTuple):
     """
 
     scalars: np.ndarray
-    events: np.ndarray
+    processes: np.ndarray
     counts: np.ndarray
     bins: np.ndarray
     sums: np.ndarray
 
 
 class Grid(NamedTuple):
-    """What is observed: output times, bin edges above L, orders of moments.
+    """What is observed: output times, bin edges above L, orders of moments, columns of the state.
 
-    `first` has for each octave the last edge at or below its start, or the very first.
+    `first` has for each octave the last edge at or below its start, or the very first; `counted`
+    and `clocked` are columns of `State.count` and `State.clock`, `processes` are numbers in
+    `PER_PROCESS`.
     """
 
     times: np.ndarray
     edges: np.ndarray
     orders: np.ndarray
     first: np.ndarray
+    counted: np.ndarray
+    clocked: np.ndarray
+    processes: np.ndarray
 
 
 def new_state(rng: np.ndarray, processes: int, entries: int, lone: int) -> State:
@@ -230,8 +288,8 @@ def new_tally(replicas: int, grid: Grid, sizes: int, processes: int) -> Tally:
     """Make room for observations; `scalars` is NaN where nothing is recorded yet."""
     shape = (replicas, len(grid.times))
     return Tally(
-        np.full((*shape, 7), np.nan),
-        np.zeros((*shape, processes), np.int64),
+        np.full((*shape, SCALARS + len(grid.counted) + len(grid.clocked)), np.nan),
+        np.zeros((*shape, len(grid.processes), processes), np.int64),
         np.zeros((*shape, sizes + 1), np.int64),
         np.zeros((*shape, len(grid.edges))),
         np.zeros((*shape, len(grid.orders))),

@@ -115,37 +115,39 @@ class Observer:
         def filled(*shape: int) -> Float:
             return np.full((1, count, *shape), np.nan)
 
+        values = {
+            "number_density": filled(),
+            "collisions": filled(),
+            "volume": filled(),
+            "moment": filled(len(self.orders)),
+            "n": filled(self.sizes),
+            "n_bin": filled(bins),
+            "events": filled(len(processes)),
+        }
+        if self._open:
+            values |= {name: filled() for name in ("mass", "mass_in", "mass_out")}
+        for t, shot in enumerate(shots):
+            known = {
+                "number_density": shot.number_density,
+                "collisions": shot.totals.events[pairs].sum(),
+                "volume": 1.0,
+                "events": shot.totals.events,
+                "moment": shot.moment,
+                "n": shot.n,
+                "n_bin": np.pad(shot.n_bin, (0, bins - len(shot.n_bin))),
+                "mass": shot.mass,
+                "mass_in": shot.totals.mass_in,
+                "mass_out": shot.totals.mass_out,
+            }
+            for name, column in values.items():
+                column[0, t] = known[name]
         records = Records(
             times=np.array(times),
             orders=self.orders,
             processes=tuple(process.name for process in processes),
             bin_edges=np.append(self.edges.astype(float), 2.0**62)[: bins + 1],
-            number_density=filled(),
-            largest=filled(),
-            particles=filled(),
-            collisions=filled(),
-            volume=np.ones((1, count)),
-            moment=filled(len(self.orders)),
-            n=filled(self.sizes),
-            n_bin=filled(bins),
-            events=filled(len(processes)),
-            extinction_time=np.full(1, np.nan),
+            values=values,
         )
-        records.volume[0, len(shots) :] = np.nan
-        for t, shot in enumerate(shots):
-            records.number_density[0, t] = shot.number_density
-            records.collisions[0, t] = shot.totals.events[pairs].sum()
-            records.events[0, t] = shot.totals.events
-            records.moment[0, t] = shot.moment
-            records.n[0, t] = shot.n
-            records.n_bin[0, t] = 0.0
-            records.n_bin[0, t, : len(shot.n_bin)] = shot.n_bin
-        if self._open:
-            inside, come, gone = filled(), filled(), filled()
-            for t, shot in enumerate(shots):
-                inside[0, t] = shot.mass
-                come[0, t], gone[0, t] = shot.totals.mass_in, shot.totals.mass_out
-            records.balance = inside, come, gone
         records.attributes["mass_error"] = [s.mass_error for s in shots]
         records.attributes["window"] = [s.window for s in shots]
         return records

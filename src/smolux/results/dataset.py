@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from xarray.indexes import PandasIndex
 
+from smolux import observables
 from smolux.model import Model
 from smolux.model_dict import model_to_dict
 from smolux.records import Records
@@ -20,31 +21,7 @@ from .attributes import provenance
 Float = NDArray[np.float64]
 
 #: variable -> (dimensions, long name)
-VARIABLES: dict[str, tuple[tuple[str, ...], str]] = {
-    "number_density": (("replica", "time"), "number of clusters per unit volume"),
-    "moment": (("replica", "time", "order"), "moment of the size distribution, sum_k k^p n_k"),
-    "largest": (("replica", "time"), "size of the largest cluster"),
-    "particles": (("replica", "time"), "number of simulated particles"),
-    "collisions": (("replica", "time"), "number of collisions so far"),
-    "volume": (("replica", "time"), "simulated volume"),
-    "n": (("replica", "time", "size"), "number density of clusters of one size"),
-    "n_bin": (("replica", "time", "bin"), "number density of clusters in a bin of sizes"),
-    "events": (("replica", "time", "process"), "number of collisions so far, by outcome"),
-    "attempts": (("replica", "process"), "number of candidates for these, accepted or not"),
-    "extinction_time": (("replica",), "time at which all particles had become one cluster"),
-}
-
-_COORDINATES = {
-    "replica": "replica",
-    "time": "time",
-    "order": "order of the moment",
-    "size": "cluster size in monomers",
-    "process": "outcome of a collision",
-    "bin": "geometric centre of the sizes in a bin",
-    "bin_lower": "smallest size in a bin",
-    "bin_upper": "edge above a bin: the bin holds the whole sizes bin_lower <= k < bin_upper",
-    "bin_width": "number of whole sizes in a bin",
-}
+VARIABLES = {o.name: (o.dims, o.long_name) for o in observables.OBSERVABLES}
 
 
 def _bins(edges: Float) -> dict[str, Any]:
@@ -82,20 +59,15 @@ def _ragged(records: Records) -> dict[str, Any]:
     }
 
 
-#: of systems that are open, see `Records.balance`
-_BALANCE = {
-    "mass": "mass in the simulated volume, in monomers",
-    "mass_in": "mass that sources have brought into this volume",
-    "mass_out": "mass that has left this volume",
-}
-
-_RAGGED_NAMES = {
-    "instance_replica": "replica of a population",
-    "instance_time": "time of a population",
-    "row_size": "number of different sizes in a population",
-    "sample_size": "cluster size in monomers",
-    "sample_count": "number of simulated particles of that size",
-}
+def _values(records: Records, lengths: Mapping[str, int]) -> dict[str, Any]:
+    """Return the variables; those that every result has are NaN where they are not known."""
+    found: dict[str, Any] = {}
+    for o in observables.OBSERVABLES:
+        if o.name in records.values:
+            found[o.name] = (o.dims, np.asarray(records.values[o.name], float))
+        elif o.everywhere:
+            found[o.name] = (o.dims, np.full([lengths[d] for d in o.dims], np.nan))
+    return found
 
 
 def _provenance(model: Model, records: Records) -> dict[str, Any]:
@@ -122,28 +94,20 @@ def to_dataset(model: Model, records: Records) -> xr.Dataset:
         dataset in the reference documentation.
     """
     units: Mapping[str, str] = records.attributes.get("units") or {}
-    replicas = np.shape(records.number_density)[0]
-    ragged = _ragged(records)
+    replicas, ragged = len(records.values["number_density"]), _ragged(records)
     coordinates: dict[str, Any] = {
         "replica": np.arange(replicas),
         "time": np.asarray(records.times, float),
         "order": np.asarray(records.orders, float),
-        "size": np.arange(1, np.shape(records.n)[2] + 1),
+        "size": np.arange(1, np.shape(records.values["n"])[2] + 1),
         "process": np.asarray(records.processes, dtype=np.str_),
         **_bins(records.bin_edges),
         **{k: ragged.pop(k) for k in ("instance_replica", "instance_time") if k in ragged},
     }
-    values = {
-        name: (dims, np.asarray(getattr(records, name), float))
-        for name, (dims, _) in VARIABLES.items()
-        if getattr(records, name) is not None
-    }
-    if records.balance is not None:
-        mass = (np.asarray(column, float) for column in records.balance)
-        values |= {k: (("replica", "time"), m) for k, m in zip(_BALANCE, mass, strict=True)}
+    values = _values(records, {k: len(v) for k, v in coordinates.items()})
     ds = xr.Dataset({**values, **ragged}, _indexed(coordinates), _provenance(model, records))
-    long_names = _COORDINATES | _RAGGED_NAMES | _BALANCE
-    long_names |= {k: text for k, (_, text) in VARIABLES.items()}
+    long_names = {name: text for name, (text, _) in observables.COORDINATES.items()}
+    long_names |= {o.name: o.long_name for o in observables.OBSERVABLES}
     for name in map(str, ds.variables):
         ds[name].attrs["long_name"] = long_names[name]
         if name not in ("process", "replica", "instance_replica"):
