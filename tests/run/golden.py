@@ -54,7 +54,7 @@ WEIGHTINGS: dict[str, Any] = {
 _FAST = {
     *((m, "pairs", "number") for m in runs.METHODS),
     *((m, "pairs in time", "number") for m in ("size-class", "acceptance-rejection")),
-    *((m, "evaporating", "mass") for m in ("size-class", "acceptance-rejection")),
+    ("acceptance-rejection", "evaporating", "mass"),
     *(("acceptance-rejection", "everything", w) for w in ("number", "power", "falling")),
 }
 _CASES = {
