@@ -7,6 +7,7 @@ process, and so does everything without pytest-xdist or with ``-n 0``.
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import tempfile
@@ -20,6 +21,10 @@ import pytest
 # each worker computes with one core; threads that wait for work of linear algebra would take it
 for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
+
+# compiling makes objects by the million: to look for cycles among them, after each 700 by default,
+# was a tenth of its time
+gc.set_threshold(20_000, 10, 10)
 
 #: more workers than this find nothing to do
 _MOST_WORKERS = 8
@@ -126,6 +131,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if hasattr(config, "workerinput"):
         place = {name: k for k, name in enumerate(_LONG)}
         items.sort(key=lambda item: place.get(group(item.nodeid), len(place)))
+
+
+def pytest_collection_finish() -> None:
+    """Modules and tests stay: no search for cycles need look at them."""
+    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from smolux.kernels.formula_kernel import FormulaKernel
+from smolux.methods import METHODS
 
 #: kernel of the tests of laws and of runs: 1, i + j, i j and the ballistic one by its coefficients
 FORMULA = "c0 + c1*(i + j) + c2*i*j + c3*(cbrt(i) + cbrt(j))**2*sqrt(1/i + 1/j)"
@@ -24,6 +25,12 @@ c3 = 0.0
 VARYING = "0.4 * (1 + sin(5 * t))"
 #: methods whose loops compile fast; with the others, what does not depend on the method is slow
 QUICK = ("size-class", "acceptance-rejection")
+#: fictitious jumps are low-rank with one product, and run its loop: of what costs more, the fast
+#: tests leave them out
+EVERY = [
+    pytest.param(name, marks=pytest.mark.slow if name == "fictitious-jumps" else ())
+    for name in (method.name for method in METHODS)
+]
 #: for tests of runs that are stopped on purpose
 stopped = pytest.mark.filterwarnings(
     r"default:(the (time )?limit of|memory|no checkpoint|\d+ replicas did not reach)"

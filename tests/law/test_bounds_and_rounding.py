@@ -12,7 +12,7 @@ import pytest
 from scipy import stats
 
 import smolux as sx
-from shared import Low, extinction, repaired
+from shared import EVERY, Low, extinction, repaired
 from smolux.kernels.formula_kernel import FormulaKernel
 
 
@@ -39,7 +39,7 @@ def test_a_bound_one_unit_too_low_is_no_broken_bound(method: str) -> None:
 
 
 @repaired
-@pytest.mark.parametrize("method", [m.name for m in sx.methods.METHODS if m.name != "inverse"])
+@pytest.mark.parametrize("method", [m for m in EVERY if m.values[0] != "inverse"])
 def test_events_that_are_missed_are_estimated(method: str) -> None:
     """Until the first candidate an eighth of the events take place."""
     known, replicas, events = laws.kernel("constant"), 2000, []
@@ -80,7 +80,9 @@ def test_what_follows_a_repair_is_right(method: str) -> None:
 
 @repaired
 @extinction
-@pytest.mark.parametrize("method", ["acceptance-rejection", "low-rank", "fictitious-jumps"])
+@pytest.mark.parametrize(
+    "method", [m for m in EVERY if m.values[0] not in ("inverse", "size-class")]
+)
 def test_the_next_event_after_a_repair_has_its_rate(method: str) -> None:
     """Three merge at an eighth of 3/V, when that is found out, and two then at 1/V."""
     known, volume = laws.kernel("constant"), 3 / 2.5

@@ -11,24 +11,30 @@ import numpy as np
 import pytest
 
 import smolux as sx
+from shared import EVERY, VARYING, extinction
 from shared import QUICK as QUICK_METHODS
-from shared import VARYING, extinction
 
 pytestmark = extinction
 
 DATA = Path(__file__).parent.parent / "reference" / "data"
 METHODS = [method.name for method in sx.methods.METHODS]
 
-#: one law with clusters alone and one with shattering; the others say the same again
-QUICK = [("multiplicative", 0.0), ("ballistic", 0.1)]
+#: the others say the same again, and `test_registry` what merges alone
+QUICK = ("ballistic", 0.1)
 
 every_method = pytest.mark.parametrize("method", METHODS)
+every_but_fictitious = pytest.mark.parametrize("method", EVERY)
+#: what `test_registry` holds every method to from other starts
+by_one_method = pytest.mark.parametrize(
+    "method",
+    [pytest.param(m, marks=() if m == QUICK_METHODS[1] else pytest.mark.slow) for m in METHODS],
+)
 
 
 @pytest.mark.parametrize(
     ("law", "shattering"),
     [
-        pytest.param(law, x, marks=() if (law, x) in QUICK else pytest.mark.slow)
+        pytest.param(law, x, marks=() if (law, x) == QUICK else pytest.mark.slow)
         for law in laws.LAWS
         for x in (0.0, 0.1)
     ],
@@ -47,26 +53,23 @@ def test_distribution_with_a_rate_that_depends_on_time(method: str) -> None:
     laws.distribution_in_time(method, VARYING, lambda t: 0.4 * (1 + np.sin(5 * t)))
 
 
-@pytest.mark.parametrize(
-    "method",
-    [pytest.param(m, marks=() if m == QUICK_METHODS[1] else pytest.mark.slow) for m in METHODS],
-)
+@by_one_method
 def test_aggregation_at_a_rate_that_depends_on_time(method: str) -> None:
     laws.aggregation_in_time(method)
 
 
-@every_method
+@by_one_method
 def test_waiting_times(method: str) -> None:
     laws.waiting_times(method)
 
 
-@every_method
+@by_one_method
 def test_first_collision(method: str) -> None:
     laws.first_collision(method)
 
 
 @pytest.mark.parametrize("law", [pytest.param("constant", marks=pytest.mark.slow), "additive"])
-@every_method
+@every_but_fictitious
 def test_fluctuations(method: str, law: str) -> None:
     laws.fluctuations(method, law)
 
@@ -85,7 +88,7 @@ def test_shattering(method: str) -> None:
     laws.shattering(method)
 
 
-@every_method
+@every_but_fictitious
 def test_ballistic_with_shattering(method: str) -> None:
     reference: dict[float, dict[int, float]] = defaultdict(dict)
     for row in csv.DictReader((DATA / "ballistic_shatter_lam0.01_moments.csv").open()):
@@ -97,7 +100,7 @@ def test_ballistic_with_shattering(method: str) -> None:
             laws.agree(ds["n"].sel(size=size), [float(row[f"n_k(t={t})"]) for t in (1, 10)], size)
 
 
-@every_method
+@every_but_fictitious
 def test_gelation(method: str) -> None:
     laws.gelation(method)
 

@@ -14,7 +14,7 @@ import pytest
 from scipy import linalg, stats
 
 import smolux as sx
-from shared import QUICK, VARYING, extinction, laborious, repaired
+from shared import EVERY, QUICK, VARYING, extinction, laborious, repaired
 from smolux import exact
 
 # a bound that is too low is to be seen by the law, not by the warning
@@ -23,7 +23,7 @@ pytestmark = [extinction, laborious, repaired]
 #: particles for a unit of volume
 DENSITY = 2.5
 METHODS = [method.name for method in sx.methods.METHODS]
-every_method = pytest.mark.parametrize("method", METHODS)
+every_method = pytest.mark.parametrize("method", EVERY)
 
 
 def start(*sizes: int, density: float = DENSITY) -> sx.initial.Sizes:
@@ -57,8 +57,18 @@ def probabilities(case: int) -> laws.Float:
     return np.asarray(linalg.expm(q * end * sum(sizes) / volume)[:, first])
 
 
-@pytest.mark.parametrize("case", range(len(FEW)))
-@every_method
+#: the law of the second is that of `test_laws.test_whole_distribution`
+FEW_QUICK = {*((m, 0) for m in METHODS if m != "fictitious-jumps"), ("acceptance-rejection", 1)}
+
+
+@pytest.mark.parametrize(
+    ("method", "case"),
+    [
+        pytest.param(m, case, marks=() if (m, case) in FEW_QUICK else pytest.mark.slow)
+        for m in METHODS
+        for case in range(len(FEW))
+    ],
+)
 def test_few_particles(method: str, case: int) -> None:
     """All states of a few particles of two sizes against the master equation."""
     sizes, law, shattering, end = FEW[case]
@@ -70,14 +80,31 @@ def test_few_particles(method: str, case: int) -> None:
 
 
 #: two sizes, the largest of their classes, levels and slots among them, and a law
-PAIRS = [
-    ((31, 31), "multiplicative"), ((6, 7), "multiplicative"), ((3, 7), "ballistic"),
-    ((1, 30_000), "multiplicative"),
-]  # fmt: skip
+PAIRS = {
+    "31-31": ((31, 31), "multiplicative"),
+    "6-7": ((6, 7), "multiplicative"),
+    "3-7": ((3, 7), "ballistic"),
+    "1-30000": ((1, 30_000), "multiplicative"),
+}
+#: a small and a large size meet in `test_wide_rates`, too, by each method
+PAIRS_QUICK = {
+    *((m, pair) for m in METHODS if m != "fictitious-jumps" for pair in ("31-31", "6-7", "3-7")),
+    ("acceptance-rejection", "1-30000"),
+    ("low-rank", "1-30000"),
+}
 
 
-@pytest.mark.parametrize(("sizes", "law"), PAIRS, ids=["31-31", "6-7", "3-7", "1-30000"])
-@every_method
+@pytest.mark.parametrize(
+    ("method", "sizes", "law"),
+    [
+        pytest.param(
+            m, *PAIRS[pair], id=f"{m}-{pair}",
+            marks=() if (m, pair) in PAIRS_QUICK else pytest.mark.slow,
+        )
+        for m in METHODS
+        for pair in PAIRS
+    ],
+)  # fmt: skip
 def test_time_until_two_merge(method: str, sizes: tuple[int, int], law: str) -> None:
     """Exponential, with the mean V/K: 2.7e-5 for the sizes 1 and 30000."""
     model = laws.model(law, 0.0, start(*sizes))
@@ -109,7 +136,7 @@ def test_two_monomers_do_not_mind_encounters_that_come_to_nothing(method: str) -
 STRAINED = [sx.methods.LowRank(bits=0), sx.methods.Inverse(buckets=4)]
 
 
-@pytest.mark.parametrize("method", [*METHODS, *STRAINED], ids=str)
+@pytest.mark.parametrize("method", [*EVERY, *STRAINED], ids=str)
 def test_after_hundreds_of_events(method: Any) -> None:
     """Eight monomers that merge and shatter: bounds, sums and tables were renewed many times."""
     particles, replicas, clock = 8, 2000, 3.0

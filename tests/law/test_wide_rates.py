@@ -10,7 +10,7 @@ import laws
 import pytest
 
 import smolux as sx
-from shared import extinction, laborious
+from shared import EVERY, extinction, laborious
 from smolux.core.state import TRIALS
 from smolux.methods import METHODS
 from smolux.planning import make_plan
@@ -25,6 +25,7 @@ END = 1e12
 FORMULA = "c0 + c1*min(1, max(0, min(i, j) - 9)) + c2*(i*j)**power + c3*(i - j)**2"
 
 every_method = pytest.mark.parametrize("method", [method.name for method in METHODS])
+every_but_fictitious = pytest.mark.parametrize("method", EVERY)
 
 
 def _kernel(
@@ -54,7 +55,7 @@ def test_rates_over_24_decades(method: str) -> None:
     [((1, 1, 10**4), 1e-16), ((1, 1, 1, 10, 12), 1e-5), ((1, 60, 60, 60, 60), 1e7)],
     ids=["giant", "two-merge-first", "dwarf"],
 )
-@every_method
+@every_but_fictitious
 def test_a_lone_particle_does_not_meet_itself(
     method: str, sizes: tuple[int, ...], end: float
 ) -> None:
@@ -131,7 +132,9 @@ def test_rates_whose_sum_no_number_holds() -> None:
         )
 
 
-@pytest.mark.parametrize("method", ["low-rank", "fictitious-jumps"])
+@pytest.mark.parametrize(
+    "method", ["low-rank", pytest.param("fictitious-jumps", marks=pytest.mark.slow)]
+)
 def test_a_majorant_of_a_law_with_zeros(method: str) -> None:
     kernel = _kernel(c3=1.0)
     start = sx.initial.from_sizes({1: 0.5, 2: 0.5})

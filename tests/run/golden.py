@@ -37,9 +37,9 @@ PROCESSES: dict[str, list[sx.processes.Process]] = {
     "evaporating": [P.Aggregation(), P.Shattering(0.05), P.Evaporation(0.2)],
     "everything": [
         P.Source({1: 0.2, 3: 0.04}, varying="1 + 0.5 * sin(3 * t)"),
-        P.Removal(0.05, above=300),
-        P.Fragmentation(0.02),
-        P.Evaporation(0.1, varying="1 + sin(5 * t)"),
+        P.Removal([0.05, 0.05], above=300),
+        P.Fragmentation(sx.kernels.formula("f + g*(i + j)", f=0.02, g=0.0)),
+        P.Evaporation([0.1, 0.1], varying="1 + sin(5 * t)"),
         P.Aggregation(),
         P.CollisionalFragmentation(0.1, 2.5, largest=12),
     ],
@@ -54,7 +54,7 @@ WEIGHTINGS: dict[str, Any] = {
 _FAST = {
     *((m, "pairs", "number") for m in runs.METHODS),
     *((m, "pairs in time", "number") for m in ("size-class", "acceptance-rejection")),
-    *((m, "evaporating", "mass") for m in ("size-class", "acceptance-rejection")),
+    ("acceptance-rejection", "evaporating", "mass"),
     *(("acceptance-rejection", "everything", w) for w in ("number", "power", "falling")),
 }
 _CASES = {

@@ -22,7 +22,10 @@ every_rate = pytest.mark.parametrize(
     [
         pytest.param(method, rate, marks=pytest.mark.slow if slow else ())
         for method in METHODS
-        for rate, slow in ((0.1, False), (VARYING, method not in QUICK))
+        for rate, slow in (
+            (0.1, method == "fictitious-jumps"),
+            (VARYING, method not in QUICK),
+        )
     ],
 )
 

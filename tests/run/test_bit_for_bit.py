@@ -10,11 +10,11 @@ import pytest
 import runs
 
 import smolux as sx
-from shared import QUICK, VARYING
+from shared import EVERY, QUICK, VARYING
 from smolux import replicas, stochastic
 from smolux.replicas import Group
 
-every_method = pytest.mark.parametrize("method", runs.METHODS)
+every_method = pytest.mark.parametrize("method", EVERY)
 TIMES = [0.5, 3.0]
 
 

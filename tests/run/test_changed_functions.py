@@ -231,6 +231,15 @@ def test_what_cannot_be_compiled_is_said_in_a_line() -> None:
     assert len(str(found.value).splitlines()) == 1
 
 
+def test_a_truth_value_is_a_number() -> None:
+    piece = user_piece(frozen(a_truth))
+    outer = numba.njit(lambda i, j: piece(i, j))
+    assert outer(1.0, 2.0) == 1.0
+    assert outer.nopython_signatures[0].return_type == numba.float64
+    assert sx.kernels.from_function(a_truth)([1.0, 2.0], 1.0).dtype == float
+
+
+@slow
 def test_a_truth_value_is_a_rate() -> None:
     model = sx.Model(sx.kernels.from_function(a_truth))
     ds = sx.simulate(

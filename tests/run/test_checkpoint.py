@@ -15,13 +15,14 @@ import runs
 
 import shared
 import smolux as sx
-from shared import QUICK, VARYING
+from shared import EVERY, QUICK, VARYING
 from smolux import checkpoint as checkpoints
 from smolux import replicas, resources, room
 from smolux.core.state import BUDGET, GROW
 from smolux.errors import InputError, Interrupted
 
 pytestmark = shared.stopped
+slow = pytest.mark.slow
 
 TIMES = [0.0, 0.3, 1.0, 2.0]
 SETTINGS: dict[str, Any] = {"particles": 2000, "replicas": 3, "seed": 5, "sizes": 40}
@@ -56,8 +57,8 @@ def go_on(path: Path, most: int = 10_000, **settings: Any) -> tuple[Any, int]:
     ("method", "distribution"),
     [
         # whole populations are written besides all else
-        pytest.param(m, whole, marks=() if whole or m in QUICK else pytest.mark.slow)
-        for m in runs.METHODS
+        pytest.param(m.values[0], whole, marks=m.marks if whole or m.values[0] in QUICK else slow)
+        for m in EVERY
         for whole in (False, True)
     ],
 )
@@ -163,7 +164,7 @@ def test_a_rate_that_is_no_number_late_keeps_what_was_computed(
 
 
 @pytest.mark.parametrize("failure", ["asked for", "refused"])
-@pytest.mark.parametrize("method", runs.METHODS)
+@pytest.mark.parametrize("method", EVERY)
 def test_no_memory_to_grow_keeps_what_was_computed(
     method: str, failure: str, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
