@@ -13,8 +13,11 @@ import sys
 from typing import Any
 
 #: what the package and its tests need, never the package itself, which changes
-_LOADED = ("numba", "numba.core.caching", "scipy.integrate", "scipy.optimize", "scipy.stats",
-           "xarray", "pytest", "cloudpickle")  # fmt: skip
+_LOADED = (
+    "cloudpickle", "hypothesis", "numba", "numba.core.caching", "numba.typed", "pytest",
+    "scipy.fft", "scipy.integrate", "scipy.optimize", "scipy.signal", "scipy.sparse.linalg",
+    "scipy.spatial", "scipy.special", "scipy.stats", "xarray",
+)  # fmt: skip
 
 
 def run(order: dict[str, Any]) -> int:
@@ -33,8 +36,8 @@ def run(order: dict[str, Any]) -> int:
 
 
 def main() -> None:
-    for name in _LOADED:
-        importlib.import_module(name)
+    loaded = {name: importlib.import_module(name) for name in _LOADED}
+    loaded["numba"].njit("int64(int64)")(lambda n: n)  # the compiler has more to load
     sys.path[0] = os.getcwd()  # as ``python -m pytest`` has it
     for line in sys.stdin:
         child = os.fork()

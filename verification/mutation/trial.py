@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import compileall
 import json
 import os
+import py_compile
 import re
 import shutil
 import signal
@@ -59,12 +61,10 @@ class Copy:
         for path in root.iterdir():
             if path.is_file():
                 shutil.copy2(path, folder / path.name)
-        environment = {
-            **os.environ,
-            "PYTHONPATH": str(folder / "src"),
-            # a file that changes twice a second may look the same to Python's own cache
-            "PYTHONDONTWRITEBYTECODE": "1",
-        }
+        # by content: a file that changes twice a second may have the same time
+        by_content = py_compile.PycInvalidationMode.CHECKED_HASH
+        compileall.compile_dir(folder / "src", quiet=2, invalidation_mode=by_content)
+        environment = {**os.environ, "PYTHONPATH": str(folder / "src")}
         with subprocess.Popen(
             [sys.executable, str(Path(__file__).parent / "server.py")], cwd=folder,
             env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
@@ -94,7 +94,8 @@ class Copy:
             No test was run.
         """
         options = [
-            "-x", "-q", "-rfE", "--tb=no", "--no-header", "-n", "0", "-p", "no:cacheprovider",
+            "-x", "-q", "-rfE", "--tb=no", "--no-header", "-p", "no:cacheprovider",
+            "-p", "no:xdist", "-p", "no:benchmark",
             *(("-m", "slow") if slow else ()),
         ]  # fmt: skip
         code, told = self._served([*options, *tests], patience)
