@@ -13,7 +13,10 @@ from scipy import stats
 
 import smolux as sx
 from shared import EVERY, Low, extinction, repaired
+from smolux.core.state import EVENTS, LARGEST, MONOMERS, SMALLEST, STORED
 from smolux.kernels.formula_kernel import FormulaKernel
+from smolux.planning import make_plan
+from smolux.replicas import Group
 
 
 class OneUnitLow(FormulaKernel):
@@ -36,6 +39,32 @@ def test_a_bound_one_unit_too_low_is_no_broken_bound(method: str) -> None:
     assert not any("bound" in text for text in json.loads(ds.attrs["warnings"]))
     exact = sx.exact.finite.number_mean("constant", 50, 1.0)
     laws.agree(ds["particles"].values[:, 0], exact, method)
+
+
+@extinction
+def test_bounds_are_for_the_sizes_that_are_there() -> None:
+    """Eight monomers merge and shatter, and are looked through every seventy events."""
+    plan = make_plan(
+        laws.model("multiplicative", 5.0),
+        [6.0],
+        method="acceptance-rejection",
+        population="fixed-volume",
+        particles=8,
+        replicas=400,
+        seed=1,
+        orders=(0, 1),
+        sizes=8,
+        bins_per_octave=1,
+    )
+    group = Group.start(plan, 0, 400)
+    group.advance(lambda: False)
+    assert (group.state.count[:, EVENTS] > 100).mean() > 0.8
+    several = group.state.count[:, STORED] > 0
+    assert several.mean() > 0.2
+    for count, sizes in zip(group.state.count[several], group.work.sizes[several], strict=True):
+        held = sizes[: count[STORED]]
+        assert count[LARGEST] >= held.max()
+        assert count[SMALLEST] <= (1 if count[MONOMERS] else held.min())
 
 
 @repaired

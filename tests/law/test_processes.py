@@ -128,6 +128,9 @@ def test_simulation_and_solver(case: str) -> None:
     np.testing.assert_array_equal(ds["mass"], np.rint(ds["mass"]))
     balance = truth["mass"] - truth["mass_in"] + truth["mass_out"]
     np.testing.assert_allclose(balance, start / 1000, atol=1e-7)
+    t, source = truth["time"].values, CASES[case].get("source", 0.0)
+    come = 1.6 * source * (t + (1.0 - np.cos(3.0 * t)) / 6.0)  # sizes 1 and 3, at 1 : 0.2
+    np.testing.assert_allclose(truth["mass_in"].values[0], come, rtol=1e-6, atol=1e-9)
     assert np.isnan(ds["extinction_time"]).all()
 
 

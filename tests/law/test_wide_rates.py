@@ -10,7 +10,7 @@ import laws
 import pytest
 
 import smolux as sx
-from shared import EVERY, extinction, laborious
+from shared import EVERY, extinction, laborious, repaired
 from smolux.core.state import TRIALS
 from smolux.methods import METHODS
 from smolux.planning import make_plan
@@ -73,6 +73,26 @@ def test_a_lone_particle_does_not_meet_itself(
     place, p = chains.law(sizes, moves, (end,), n)
     mean = sum(p[0][k] * len(state) for state, k in place.items())
     assert 1.2 < mean < n - 0.2
+    laws.agree(ds["particles"].values[:, 0], mean, method)
+
+
+@repaired  # a bound that is too low is to be seen by the law
+@pytest.mark.parametrize("method", ["acceptance-rejection", "low-rank"])
+def test_a_second_lone_particle_is_noticed(method: str) -> None:
+    """Pairs without the one of 15 have bounds in which two that merge have no part."""
+
+    def law(i: int, j: int) -> float:
+        return 5e4 + float(i * j) ** 4
+
+    kernel, sizes, end = _kernel(c0=5e4, c2=1.0), (1, 1, 1, 15), 1.5e-5
+    start = sx.initial.from_sizes({1: 0.75, 15: 0.25})
+    ds = sx.simulate(
+        sx.Model(kernel, initial=start), [end], method=method, population="fixed-volume",
+        particles=4, replicas=1000, bins_per_octave=1, seed=4,
+    )  # fmt: skip
+    moves = chains.pairs(law, lambda k: 1.0, float(ds["volume"][0, 0]))
+    place, p = chains.law(sizes, moves, (end,), 4)
+    mean = sum(p[0][k] * len(state) for state, k in place.items())
     laws.agree(ds["particles"].values[:, 0], mean, method)
 
 

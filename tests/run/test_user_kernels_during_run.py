@@ -315,6 +315,20 @@ def test_a_raised_bound_of_the_kernel_lasts(
     np.testing.assert_allclose(group.state.missed[:, BY_KERNEL], 1.0)
 
 
+@extinction
+def test_a_raised_bound_of_a_factor_leaves_the_others_their_rates() -> None:
+    """Two monomers merge at the rate 1/2; that they shatter twice as often as stated is nothing."""
+    stated = replace(rate(1.0, 1.0), stated=(0.0, 0.5))
+    processes = [sx.processes.Aggregation(), sx.processes.Shattering(stated)]
+    with pytest.warns(SmoluxWarning, match="in 1... of 4000 replicas"):
+        ds = sx.simulate(
+            sx.Model(sx.kernels.from_function(odd, bounds=one), processes), [1e6], seed=8, sizes=1,
+            method="acceptance-rejection", population="fixed-volume", particles=2, replicas=4000,
+            bins_per_octave=1,
+        )  # fmt: skip
+    assert stats.kstest(ds["extinction_time"], stats.expon(scale=2.0).cdf).pvalue > 1e-4
+
+
 def test_a_raised_bound_of_a_factor_lasts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Dimers that merge or shatter, both at the rate one, of which one half is stated.
 

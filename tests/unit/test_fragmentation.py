@@ -10,6 +10,7 @@ import pytest
 from scipy import stats
 
 import smolux as sx
+from smolux import assembly
 from smolux.callables import Function
 from smolux.core import rng, splits
 from smolux.core.slots import slot_edges
@@ -62,6 +63,18 @@ def test_bounds_hold_in_the_bins(law: object) -> None:
                 assert largest <= bounds[s, b]
                 if isinstance(law, str) and count:  # and not far off, for smooth laws
                     assert largest > 0.3 * bounds[s, b]
+
+
+def test_bounds_of_a_slot_hold_for_its_largest_size() -> None:
+    """A law that is 21 for the largest size of a slot, and 1 for all others."""
+    slots = splits.slots_beside(20_000)
+    for slot, top in zip(range(slots.start, slots.stop), EDGES[1:][slots] - 1.0, strict=True):
+        law = sx.kernels.formula("1 + 20*max(0, 1 - abs(i + j - top))", top=top)
+        processes = [sx.processes.Aggregation(), Fragmentation(law)]
+        parameters = assembly.factor_parameters(processes)
+        assembly.bound_splits(processes, parameters, 20_000)
+        known = parameters.lone[0][1]
+        assert known.bounds[slot - splits._FIRST].max() >= 21.0 * (top // 2)
 
 
 @numba.njit

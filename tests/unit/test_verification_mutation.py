@@ -40,14 +40,16 @@ def test_no_mistake_is_made_twice():
     assert len(made) == len(set(made))
 
 
-@pytest.fixture
-def copy(tmp_path):
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    tmp_path = tmp_path_factory.mktemp("mutation")
     checkout = tmp_path / "checkout"
     for name, text in {"src/smolux/__init__.py": "", "src/smolux/numbers.py": CODE,
                        "tests/test_numbers.py": TEST, "pyproject.toml": ""}.items():  # fmt: skip
         (checkout / name).parent.mkdir(parents=True, exist_ok=True)
         (checkout / name).write_text(text)
-    return Copy.of(checkout, tmp_path / "copy", tmp_path / "compiled")
+    with Copy.of(checkout, tmp_path / "copy", tmp_path / "compiled") as made:
+        yield made
 
 
 def of_twice(old: str, new: str) -> Mistake:
@@ -72,9 +74,9 @@ def test_what_cannot_be_made_is_refused(copy, mistake):
 def test_tests_that_say_nothing_are_no_success(copy):
     with pytest.raises(BrokenTrialError):
         copy.failing(["tests/test_numbers.py"], slow=True)
-    (copy.folder / "src/smolux/numbers.py").write_text("twice = None")
-    with pytest.raises(BrokenTrialError, match="fails without a mistake"):
-        trials.pass_unchanged(copy, (("tests/test_numbers.py",), False))
+    with copy.mistaken(of_twice("2 *", "3 *")) as wrong:  # noqa: SIM117
+        with pytest.raises(BrokenTrialError, match="fails without a mistake"):
+            trials.pass_unchanged(wrong, (("tests/test_numbers.py",), False))
 
 
 def test_all_areas_are_counted_together():

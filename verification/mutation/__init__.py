@@ -16,6 +16,8 @@ SUITE = Suite(
         "factor of two. The tests that should see it run on that copy, up to the first that fails.",
         "The same tests pass on an unchanged copy. If they pass on the changed one, too, the "
         "mistake is not seen. A test that does not end, and an interpreter that crashes, are seen.",
+        "With `SMOLUX_CACHE_DIR` set, what was tried is kept there: with the same code, the same "
+        "tests and the same mistake it is not tried again.",
         "The mistakes are in `verification/mutation/mistakes`. A new one is an entry there.",
     ),
 )

@@ -37,7 +37,7 @@ class Settings:
     particles: int = setting(Whole(2, 2**50), 100_000)
     replicas: int = setting(Whole(1, PILOT - 1), 8)
     seed: int | None = setting(Whole(0, optional=True), None)
-    orders: tuple[float, ...] = setting(Orders(), (0, 1, 2, 3))
+    orders: tuple[float, ...] = setting(Orders(), (0.0, 1.0, 2.0, 3.0))
     sizes: int = setting(Whole(1, MOST_SIZES), 1024)
     bins_per_octave: int = setting(Whole(1, 1024), 4)
     distribution: bool = setting(Flag(), False)

@@ -29,7 +29,7 @@ class SolverSettings:
     )
     window: int | None = setting(Whole(_SMALLEST, MOST_SIZES, optional=True), None)
     max_window: int | None = setting(Whole(_SMALLEST, MOST_SIZES, optional=True), None)
-    orders: tuple[float, ...] = setting(Orders(), (0, 1, 2, 3))
+    orders: tuple[float, ...] = setting(Orders(), (0.0, 1.0, 2.0, 3.0))
     sizes: int = setting(Whole(1, MOST_SIZES), 1024)
     bins_per_octave: int = setting(Whole(1, 1024), 4)
     gel: str = setting(Choice(GELS), "inert")
