@@ -79,8 +79,21 @@ def states(ds: Any, weighting: Any, sizes: int) -> list[tuple[int, ...]]:
     return [tuple(np.repeat(np.arange(1, sizes + 1), row).tolist()) for row in counts]
 
 
-@pytest.mark.parametrize(("q", "shattering", "evaporation", "depth"), CHAINS)
-@every_method
+#: means are held to the law by every power and quick method below
+QUICK_CHAINS = {
+    *(("acceptance-rejection", chain) for chain in CHAINS),
+    *(("size-class", chain) for chain in CHAINS[:2]),
+}
+
+
+@pytest.mark.parametrize(
+    ("method", "q", "shattering", "evaporation", "depth"),
+    [
+        pytest.param(m, *chain, marks=() if (m, chain) in QUICK_CHAINS else pytest.mark.slow)
+        for m in METHODS
+        for chain in CHAINS
+    ],
+)
 def test_whole_distribution(
     method: str, q: float, shattering: float, evaporation: float, depth: int, expected: Any
 ) -> None:
