@@ -27,6 +27,8 @@ _LIFT = 18.0
 EDGE = 3e-11
 #: relative error of a step of the integrator
 RTOL = 1e-11
+#: evaluations of the rates times sizes, of one window: minutes of processor time
+MOST = 500_000_000
 
 
 def one(t: float) -> float:
@@ -194,11 +196,16 @@ def fragments(shares: Sequence[float], largest: int) -> Float:
     return found[1:]
 
 
+class TooLong(RuntimeError):
+    """Explicit steps would take too long."""
+
+
 class _Rates:
     """The right-hand side: densities, events, mass in and out, and what passes the edge."""
 
     def __init__(self, problem: Problem, largest: int) -> None:
         self.problem, self.m = problem, largest
+        self.left = MOST // largest
         self.k = np.arange(1.0, largest + 1.0)
         self.beyond = np.arange(largest + 1.0, 2.0 * largest + 1.0)
         self.sums = Sums(problem.law, largest, falls=problem.cut is None)
@@ -207,6 +214,9 @@ class _Rates:
         self.names = [p.name for p in (*problem.pairs, *problem.lone, *problem.inflow)]
 
     def __call__(self, t: float, y: Float) -> Float:
+        self.left -= 1
+        if self.left < 0:
+            raise TooLong(f"more than {MOST // self.m} evaluations for {self.m} sizes")
         n, m, k = y[: self.m], self.m, self.k
         dn, extra = np.zeros(m), np.zeros(len(y) - m)
         events, account = extra[: len(self.names)], extra[len(self.names) :]
@@ -251,7 +261,13 @@ class _Rates:
 def solve(
     problem: Problem, times: Sequence[float], *, rtol: float = RTOL, method: str = "DOP853"
 ) -> Solution:
-    """Solve on a window that is made wider until next to nothing passes its edge."""
+    """Solve on a window that is made wider until next to nothing passes its edge.
+
+    Raises
+    ------
+    TooLong
+        If that takes more than `MOST`.
+    """
     largest = problem.cut or problem.largest
     while True:
         found = _solve(problem, times, largest, rtol, method)
