@@ -50,7 +50,7 @@ def _row(at: int, cell: Cell) -> dict[str, Any]:
         if at % _AGAIN == 0:
             loose = reference.solve(cell.problem, cell.times, rtol=_LOOSE)
             own = max(own, float(np.max(np.abs(loose.moment / exact.moment - 1.0))))
-    except reference.TooLong as error:
+    except reference.TooLongError as error:
         return {"cell": cell.name, "left out": str(error)}
     runs = {}
     for way, options in _ways(exact.window).items():

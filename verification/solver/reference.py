@@ -196,7 +196,7 @@ def fragments(shares: Sequence[float], largest: int) -> Float:
     return found[1:]
 
 
-class TooLong(RuntimeError):
+class TooLongError(RuntimeError):
     """Explicit steps would take too long."""
 
 
@@ -216,7 +216,7 @@ class _Rates:
     def __call__(self, t: float, y: Float) -> Float:
         self.left -= 1
         if self.left < 0:
-            raise TooLong(f"more than {MOST // self.m} evaluations for {self.m} sizes")
+            raise TooLongError(f"more than {MOST // self.m} evaluations for {self.m} sizes")
         n, m, k = y[: self.m], self.m, self.k
         dn, extra = np.zeros(m), np.zeros(len(y) - m)
         events, account = extra[: len(self.names)], extra[len(self.names) :]
@@ -265,7 +265,7 @@ def solve(
 
     Raises
     ------
-    TooLong
+    TooLongError
         If that takes more than `MOST`.
     """
     largest = problem.cut or problem.largest
