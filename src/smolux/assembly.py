@@ -156,8 +156,8 @@ def uncompilable(model: Model, weighting: Weighting) -> list[str]:
     _, lone, _ = _kinds(model)
     given: list[tuple[str, Callable[..., Any], int]] = [
         *((f"the kernel {k.label}", k.rate, 2 + len(k.parameters)) for _, k in model.kernel.parts),
-        *((f"the rate of {p.name}", p.law, 2 if p.splits else 1) for p in lone),
-        *((f"the rate of {p.name} in time", p.factor.rate, 1) for p in model.processes),
+        *((f"the rate of {p.called}", p.law, 2 if p.splits else 1) for p in lone),
+        *((f"the rate of {p.called} in time", p.factor.rate, 1) for p in model.processes),
     ]
     if weighting.weight is not None:
         given.append(("the weight function", weighting.weight, 1))

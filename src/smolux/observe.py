@@ -139,7 +139,7 @@ def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
     return Records(
         times=np.array(plan.times),
         orders=np.array(plan.orders),
-        processes=tuple(process.name for process in plan.model.processes),
+        processes=tuple(process.called for process in plan.model.processes),
         bin_edges=np.append(edges, 2.0**62)[: seen.used + 1],
         values=values,
         distribution=[rows for g in groups for rows in g.distribution]

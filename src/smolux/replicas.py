@@ -282,7 +282,7 @@ class Group:
         process = int(self.state.count[r, PROCESS])
         value, window = float(self.state.clock[r, VALUE]), int(self.state.count[r, WINDOW])
         name, text = (
-            self.plan.model.processes[process].name,
+            self.plan.model.processes[process].called,
             self.plan.model.processes[process].factor.text,
         )
         if not (np.isfinite(value) and value >= 0):
@@ -332,7 +332,7 @@ def _bad_rate(model: Model, state: State, r: int) -> str:
         whose, where = f"the kernel {model.kernel.label}", f"sizes {i} and {j}"
     else:
         process = [p for p in model.processes if isinstance(p, LoneProcess)][culprit - 1]
-        whose = f"the rate of {process.name}"
+        whose = f"the rate of {process.called}"
         where = f"fragments {i} and {j}" if j else f"size {i}"
     return (
         f"{whose} gave {state.clock[r, VALUE]:.6g} for the {where}, met at "

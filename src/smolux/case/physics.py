@@ -99,7 +99,10 @@ def _place(message: str, data: Mapping[str, Any]) -> Path:
     def likeness(entry: tuple[Path, Mapping[str, Any]]) -> int:
         path, table = entry
         # "kernel 'brownian': ...", "the shattering rate = ...", "initial density ..."
-        return 2 * (f"{table.get('name')}" in message) + (str(path[0])[:7] in message)
+        names = table.get("name"), table.get("label", table.get("name"))
+        named = sum(f"{name}" in message for name in names)
+        quoted = any(f"{key} = {value!r}" in message for key, value in table.items())
+        return 2 * named + (str(path[0])[:7] in message) + quoted
 
     path, table = max(tables, key=likeness, default=((), {}))
     for key in table:
@@ -279,6 +282,8 @@ def _processes(content: Any, problems: Problems) -> list[dict[str, Any]]:
 
 def _of_process(kind: type[Process], key: str) -> str:
     """Return in words what a parameter of a process may be."""
+    if key == "label":
+        return 'a text such as "wall"'
     variable = getattr(kind, "variables", {"rate": "t"}).get(key)
     if variable == "t":
         return 'a number or a formula in t such as "0.01*(1 - t/400)"'

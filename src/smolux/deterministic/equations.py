@@ -137,7 +137,8 @@ class Equations:
             term.add(p, self._factor(p, times), n, meeting, flow)
         self._beyond = None if meeting.beyond is None else meeting.beyond[-1]
         if self._gel is not None:
-            self._to_gel(n, self._factor(0, times), flow)
+            for p in range(len(self.pairs)):  # which all aggregate
+                self._to_gel(p, self._factor(p, times), n, flow)
         if self.cut:
             flow.leave()
         return flow.rates, flow.along
@@ -155,13 +156,13 @@ class Equations:
         found = self._beyond if self._beyond is not None else self.operator.beyond(n)
         return factor * found
 
-    def _to_gel(self, n: Float, factor: Float, flow: Flow) -> None:
+    def _to_gel(self, p: int, factor: Float, n: Float, flow: Flow) -> None:
         """Let the mass beyond the window take up particles."""
         assert self._gel is not None
         lost = n * self._gel * (factor * (self.mass - n @ self.sizes))[:, None]
         events = lost.sum(axis=1)
         flow.rates -= lost
-        flow.events[:, 0] += events
+        flow.events[:, p] += events
         flow.number -= events
         flow.over_mass += lost @ self.sizes
 
@@ -170,7 +171,7 @@ class Equations:
         law = self._factors[p]
         if law.constant is not None:
             return np.full(len(times), law.constant)
-        return factor_at(law, np.clip(times, *self.span), f"the rate of {self.processes[p].name}")
+        return factor_at(law, np.clip(times, *self.span), f"the rate of {self.processes[p].called}")
 
     def conserves(self, n: Float) -> bool:
         """Whether no mass leaves at a rate that depends on what is there."""

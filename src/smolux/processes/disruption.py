@@ -65,6 +65,8 @@ class CollisionalFragmentation(PairProcess):
         always fits. ``[1]`` leaves monomers alone, as `Shattering` does.
     largest : int, optional
         The largest fragment; 64, or as many as there are values.
+    label : str, optional
+        What it is called in results, if not by its name.
 
     References
     ----------

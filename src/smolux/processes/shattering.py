@@ -29,6 +29,8 @@ class Shattering(PairProcess):
     rate : float, callable or str
         The parameter λ, dimensionless: a number, a function of time ``f(t)``, or a formula in ``t``
         such as ``"0.01 * (1 - t/400)"``. Never negative.
+    label : str, optional
+        What it is called in results, if not by its name.
 
     References
     ----------
