@@ -86,9 +86,8 @@ class Seen:
         if self.plan.weighting.weight is None:
             return self.recorded("particles") / self.volume
         weights = self.plan.weighting.stands_for(self.sizes)
-        stood = [
-            g.tally.counts[:, :, 1:] @ weights + g.tally.bins.sum(axis=-1) for g in self.groups
-        ]
+        tallies = (g.tally for g in self.groups)
+        stood = [t.counts[:, :, 1:] @ weights + t.bins.sum(axis=-1) for t in tallies]
         return np.asarray(np.concatenate(stood) / self.volume)
 
     def moment(self) -> Float:
