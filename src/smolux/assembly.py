@@ -189,10 +189,10 @@ def uncompilable(model: Model, weighting: Weighting) -> list[str]:
     _, lone, _ = _kinds(model)
     given: list[tuple[str, Callable[..., Any], int]] = [
         *((f"the kernel {k.label}", k.rate, 2 + len(k.parameters)) for _, k in model.kernel.parts),
-        *((f"the rate of {p.name}", p.law, 2 if p.splits else 1) for p in lone),
-        *((f"the rate of {p.name} in time", p.factor.rate, 1) for p in model.processes),
+        *((f"the rate of {p.called}", p.law, 2 if p.splits else 1) for p in lone),
+        *((f"the rate of {p.called} in time", p.factor.rate, 1) for p in model.processes),
         *(
-            (f"the share of {p.name}", p.shared.rate, 2 + len(p.shared.parameters))
+            (f"the share of {p.called}", p.shared.rate, 2 + len(p.shared.parameters))
             for p in model.processes
             if isinstance(p, PairProcess) and p.shared is not None
         ),

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from .errors import InputError, Problem
 from .initial import Initial, monodisperse
 from .kernels.base import Kernel
@@ -26,15 +28,16 @@ class Model:
         The collision rate, see `smolux.kernels`; ``kernels.Constant(0)`` if nothing collides.
     processes : sequence of Process
         What happens to pairs, to single particles, and from outside, see `smolux.processes`;
-        aggregation alone if left out. They are kept in this order.
+        aggregation alone if left out. They are kept in this order. Of two of a kind at least one
+        has a label: ``Removal(0.1), Removal("0.1/k", label="wall")``.
     initial : Initial
         Sizes at time zero, see `smolux.initial`; monomers of unit density if left out.
 
     Raises
     ------
     InputError
-        With every problem found: wrong types, no process, a process named twice, a kernel that is
-        asymmetric, negative or not finite on a sample of sizes.
+        With every problem found: wrong types, no process, two processes that are called the same,
+        a kernel that is asymmetric, negative or not finite on a sample of sizes.
     """
 
     kernel: Kernel
@@ -61,12 +64,8 @@ class Model:
             for p in processes
             if not isinstance(p, Process)
         ]
-        names = [p.name for p in processes if isinstance(p, Process)]
-        problems += [
-            f"process {n!r} is given {names.count(n)} times: give it once"
-            for n in set(names)
-            if names.count(n) > 1
-        ]
+        names = [p.called for p in processes if isinstance(p, Process)]
+        problems += _label_problems([p for p in processes if isinstance(p, Process)])
         if not isinstance(self.initial, Initial):
             problems.append(
                 f"initial = {self.initial!r}: must be an initial condition such as "
@@ -108,10 +107,11 @@ class Model:
     @property
     def plain_aggregation(self) -> bool:
         """Whether aggregation alone takes place, at the rate of the kernel at all times."""
-        first = self.processes[0]
-        return (
-            self.only_aggregates and first.factor.constant == 1.0 and first.shared is None  # type: ignore[attr-defined]
-        )
+        factors = [process.factor.constant for process in self.processes]
+        pairs = [process for process in self.processes if isinstance(process, PairProcess)]
+        # several of them have their rates together
+        whole = sum(np.nan if f is None else f for f in factors) == 1.0
+        return self.only_aggregates and whole and all(p.shared is None for p in pairs)
 
     @property
     def open(self) -> bool:
@@ -123,6 +123,25 @@ class Model:
         """The size above which particles leave at once, if there is one."""
         limits = [p.above for p in self.processes if isinstance(p, Removal) and p.above is not None]
         return min(limits, default=None)
+
+
+def _label_problems(processes: Sequence[Process]) -> list[str]:
+    """Return what is wrong with the labels by which processes are told apart in results."""
+    problems = [
+        f"{p.name}: label = {p.label!r}: must be a text such as 'wall'"
+        for p in processes
+        if p.label is not None and not (isinstance(p.label, str) and p.label.strip())
+    ]
+    if problems:
+        return problems
+    names = [p.called for p in processes]
+    for name in sorted({n for n in names if names.count(n) > 1}):
+        kind = next(type(p).__name__ for p in processes if p.called == name)
+        problems.append(
+            f"process {name!r} is given {names.count(name)} times: tell them apart by labels, by "
+            f'which they go in results, as in {kind}(..., label="{name} 2")'
+        )
+    return problems
 
 
 def _open_problems(processes: Sequence[Process], initial: Initial) -> list[str]:

@@ -55,7 +55,8 @@ def _plain(value: Any) -> Any:
 
 
 def _fields(thing: Process | Initial) -> dict[str, Any]:
-    return {f.name: _plain(getattr(thing, f.name)) for f in fields(thing)}
+    found = {f.name: _plain(getattr(thing, f.name)) for f in fields(thing)}
+    return {name: value for name, value in found.items() if (name, value) != ("label", None)}
 
 
 def _kernel_to_dict(kernel: Kernel) -> dict[str, Any]:

@@ -87,9 +87,8 @@ class Seen:
         if self.plan.weighting.weight is None:
             return self.recorded("particles") / self.volume
         weights = self.plan.weighting.stands_for(self.sizes)
-        stood = [
-            g.tally.counts[:, :, 1:] @ weights + g.tally.bins.sum(axis=-1) for g in self.groups
-        ]
+        tallies = (g.tally for g in self.groups)
+        stood = [t.counts[:, :, 1:] @ weights + t.bins.sum(axis=-1) for t in tallies]
         return np.asarray(np.concatenate(stood) / self.volume)
 
     def moment(self) -> Float:
@@ -140,7 +139,7 @@ def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
     return Records(
         times=np.array(plan.times),
         orders=np.array(plan.orders),
-        processes=tuple(process.name for process in plan.model.processes),
+        processes=tuple(process.called for process in plan.model.processes),
         bin_edges=np.append(edges, 2.0**62)[: seen.used + 1],
         values=values,
         distribution=[rows for g in groups for rows in g.distribution]

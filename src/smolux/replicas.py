@@ -261,7 +261,7 @@ class Group:
             process = plan.physics.processes[int(self.state.count[r, PROCESS])]
             assert isinstance(process, PairProcess)
             assert process.shared is not None
-            raise InputError(_bad_share(process.name, process.shared, self.state, r))
+            raise InputError(_bad_share(process.called, process.shared, self.state, r))
         elif code == TOO_LARGE:
             raise InputError(
                 "a cluster would reach 2**62 monomers, more than can be counted, near "
@@ -285,7 +285,7 @@ class Group:
         process = int(self.state.count[r, PROCESS])
         value, window = float(self.state.clock[r, VALUE]), int(self.state.count[r, WINDOW])
         name, text = (
-            self.plan.model.processes[process].name,
+            self.plan.model.processes[process].called,
             self.plan.model.processes[process].factor.text,
         )
         if not (np.isfinite(value) and value >= 0):
@@ -343,13 +343,13 @@ def _bad_rate(model: Model, state: State, r: int) -> str:
     if culprit == 0 and isinstance(model.kernel, Shared):
         share = model.kernel.share
         if not 0.0 <= float(share(i, j)) <= WHOLE:
-            name = next(p.name for p in model.processes if isinstance(p, PairProcess))
+            name = next(p.called for p in model.processes if isinstance(p, PairProcess))
             return _bad_share(name, share, state, r)
     if culprit == 0:
         whose, where = f"the kernel {model.kernel.label}", f"sizes {i} and {j}"
     else:
         process = [p for p in model.processes if isinstance(p, LoneProcess)][culprit - 1]
-        whose = f"the rate of {process.name}"
+        whose = f"the rate of {process.called}"
         where = f"fragments {i} and {j}" if j else f"size {i}"
     return (
         f"{whose} gave {state.clock[r, VALUE]:.6g} for the {where}, met at "

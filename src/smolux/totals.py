@@ -152,7 +152,7 @@ class Totals:
         found += self._raised(name, self.splits_raised, lacking, cure)
         cure = "A formula in t has proved bounds; of a function, smolux.law states them"
         for k, process in enumerate(plan.model.processes):
-            name = f"{process.name}, {process.factor.text},"
+            name = f"{process.called}, {process.factor.text},"
             lacking = _lacking(self.missed[BY_FACTOR + k], int(self.events[k]))
             found += self._raised(name, int(self.factors_raised[k]), lacking, cure)
         return found
@@ -182,7 +182,7 @@ class Totals:
                     else "its rate differs much among sizes or splits that are nearly the same"
                 )
                 found.append(
-                    f"{process.name}: {tried:.3g} candidates for {done} events, fewer than 1 in "
+                    f"{process.called}: {tried:.3g} candidates for {done} events, fewer than 1 in "
                     f"{1 / _RARE:g}; the result is right, but took long: {cure}"
                 )
         return found

@@ -149,14 +149,14 @@ def _check_factors(
         if wrong.any():
             t = float(times[wrong.argmax()])
             problems.append(
-                f"the rate of {process.name}, {process.factor.text}, is {values[wrong][0]:.6g} "
+                f"the rate of {process.called}, {process.factor.text}, is {values[wrong][0]:.6g} "
                 f"at t = {t:.6g}, before the end at {end:g}; it must not be negative: end earlier, "
                 "or cut it off with max(0, ...)"
             )
         elif not np.isfinite(bounds[:, k]).all():
             t = edges[int(np.argmin(np.isfinite(bounds[:, k])))]
             problems.append(
-                f"the rate of {process.name}, {process.factor.text}, has no finite bound near "
+                f"the rate of {process.called}, {process.factor.text}, has no finite bound near "
                 f"t = {t:.6g}; it must stay finite up to the end"
             )
     if problems:

@@ -16,7 +16,7 @@ from typing import Any
 import laws
 import numpy as np
 import pytest
-from scipy import integrate
+from scipy import integrate, linalg, stats
 
 import smolux as sx
 from shared import FORMULA, laborious
@@ -541,3 +541,116 @@ def test_other_kernels_do_not_vanish() -> None:
     for law in (sx.kernels.Constant(1e-300), sx.kernels.Ballistic(), sx.kernels.formula("1/i/j")):
         assert not law.vanishes
     assert not sx.kernels.from_function(lambda i, j: 1.0 if i + j == 7 else 0.0).vanishes
+
+
+# --- several of a kind ---------------------------------------------------------------------------
+
+DILUTION, WALL = 0.3, 0.9
+
+
+def test_two_removals_are_one_with_their_rates_together() -> None:
+    """The number of particles of a small system by its master equation, and who took them."""
+    particles, replicas, end = 12, 4000, 0.7
+    processes = [P.Aggregation(), P.Removal(DILUTION), P.Removal(WALL, label="wall")]
+    ds = sx.simulate(
+        sx.Model(laws.kernel("constant"), processes), [end], method="acceptance-rejection",
+        particles=particles, replicas=replicas, seed=11, sizes=particles,
+        population="fixed-volume",
+    )  # fmt: skip
+    n = np.arange(particles + 1.0)
+    rate = float(laws.kernel("constant")(1, 1))
+    down = rate * n * (n - 1) / (2 * particles) + (DILUTION + WALL) * n
+    chain = np.diag(-down) + np.diag(down[1:], 1)
+    law = linalg.expm(end * chain)[:, -1]
+    seen = np.bincount(ds["particles"].values[:, 0].astype(int), minlength=particles + 1)
+    often = replicas * law > 10
+    found = np.append(seen[often], seen[~often].sum())
+    expected = replicas * np.append(law[often], law[~often].sum())
+    # fewer than 7e-5 of right programs are beyond
+    assert stats.chisquare(found, expected).pvalue > 7e-5
+    assert ds["process"].values.tolist() == ["aggregation", "removal", "wall"]
+    mine, walls = (float(ds["events"].sel(process=p).sum()) for p in ("removal", "wall"))
+    share, taken = WALL / (DILUTION + WALL), mine + walls
+    assert abs(walls - share * taken) < 4 * np.sqrt(taken * share * (1 - share))
+    assert taken > replicas
+
+
+def test_two_of_a_kind_in_the_solver() -> None:
+    kernel, times = sx.kernels.Additive(0.2), [0.5, 2.0]
+
+    def solved(*processes: Any) -> Any:
+        return sx.solve(sx.Model(kernel, [P.Aggregation(), *processes]), times, tolerance=1e-9)
+
+    one = solved(P.Removal("1.2 + 0.1*k"))
+    two = solved(P.Removal("0.3 + 0.025*k"), P.Removal("0.9 + 0.075*k", label="wall"))
+    np.testing.assert_allclose(two["moment"], one["moment"], rtol=1e-8)
+    events = two["events"]
+    np.testing.assert_allclose(events.sel(process="wall"), 3 * events.sel(process="removal"))
+    np.testing.assert_allclose(
+        events.sel(process=["removal", "wall"]).sum("process"),
+        one["events"].sel(process="removal"), rtol=1e-8,
+    )  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore:.*beyond the 200 sizes:smolux.errors.SmoluxWarning")
+def test_several_aggregations_are_one_with_their_rates_together() -> None:
+    """For exact solutions, a gel, and whatever asks whether there is aggregation alone."""
+    kernel = sx.kernels.Multiplicative()
+    one = sx.Model(kernel)
+    two = sx.Model(kernel, [P.Aggregation(0.25), P.Aggregation(0.75, label="sticky")])
+    assert two.plain_aggregation
+    assert not sx.Model(kernel, [P.Aggregation(), P.Aggregation(label="more")]).plain_aggregation
+    found, known = (sx.exact.solution(m) for m in (two, one))
+    assert found == known
+    assert found is not None
+    a, b = (sx.solve(m, [0.5, 2.0], gel="reacts", window=200, tolerance=1e-7) for m in (two, one))
+    np.testing.assert_allclose(a["moment"], b["moment"], rtol=1e-6)
+    events = a["events"]
+    np.testing.assert_allclose(
+        events.sel(process="sticky"), 3 * events.sel(process="aggregation"), rtol=1e-9
+    )
+    np.testing.assert_allclose(events.sum("process"), b["events"].sum("process"), rtol=1e-6)
+
+
+def test_labels_are_kept() -> None:
+    model = sx.Model(sx.kernels.Constant(), [P.Aggregation(), P.Removal(0.1),
+                                             P.Removal("k**(-1/3)", label="wall")])  # fmt: skip
+    assert model_from_dict(model_to_dict(model)) == model
+    assert "label" not in model_to_dict(model)["processes"][1]
+    text = """
+        kernel = { name = "constant" }
+        run = { times = [1.0], particles = 100, replicas = 2 }
+        [[processes]]
+        name = "aggregation"
+        [[processes]]
+        name = "removal"
+        rate = 0.1
+        [[processes]]
+        name = "removal"
+        label = "wall"
+        rate = "k**(-1/3)"
+        """
+    case = cases.parse(text)
+    assert case.model == model
+    assert cases.parse(case.to_toml()).model == model
+    for key, which in (("wall", 2), ("removal", 1)):
+        processes: Any = cases.parse(text, sets=[f"processes.{key}.rate=0.5"]).model.processes
+        assert [k for k in (1, 2) if processes[k].of_size.constant == 0.5] == [which]
+
+
+@pytest.mark.parametrize(
+    ("processes", "message"),
+    [
+        (
+            [P.Removal(0.1), P.Removal(0.2)],
+            "process 'removal' is given 2 times: tell them apart by labels, .*"
+            r"as in Removal\(\.\.\., label=\"removal 2\"\)",
+        ),
+        ([P.Removal(0.1, label="source"), P.Source(1.0)], "process 'source' is given 2 times"),
+        ([P.Removal(0.1, label=" ")], "removal: label = ' ': must be a text such as 'wall'"),
+        ([P.Aggregation(label=3)], "aggregation: label = 3: must be a text"),
+    ],
+)
+def test_mistakes_in_labels(processes: list[Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        sx.Model(sx.kernels.Constant(), processes)

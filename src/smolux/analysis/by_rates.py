@@ -126,7 +126,7 @@ def _checked(ds: xr.Dataset, sizes: ArrayLike, model: Model | None) -> tuple[Any
             "model = None: the result does not hold its kernel, a Python function; give the model"
         )
     elif not found.reduced.plain_aggregation:
-        names = ", ".join(p.name for p in found.processes)
+        names = ", ".join(p.called for p in found.processes)
         problems.append(
             f"ds: has the processes {names}; only aggregation alone is supported, at the rate of "
             "the kernel"

@@ -253,7 +253,7 @@ def _change(content: dict[str, Any], option: str, problems: Problems) -> None:
         step = _step(table, part)
         if step is None:
             problems.options[(*path, part)] = label
-            names = [str(p.get("name")) for p in table if isinstance(p, Mapping)]
+            names = [str(p.get("label", p.get("name"))) for p in table if isinstance(p, Mapping)]
             problems.add(
                 (*path, part), f"there is no entry {part!r}; there are {', '.join(names) or 'none'}"
             )
@@ -275,15 +275,15 @@ def _change(content: dict[str, Any], option: str, problems: Problems) -> None:
 
 
 def _step(table: Any, part: str) -> str | int | None:
-    """Key of a table, or index of an array by number or by the name of its entry."""
+    """Key of a table, or index of an array by number, or by the label or name of its entry."""
     if not isinstance(table, list):
         return part
     if part.isdecimal() and int(part) < len(table):
         return int(part)
-    for n, entry in enumerate(table):
-        if isinstance(entry, Mapping) and entry.get("name") == part:
-            return n
-    return None
+    entries = [entry if isinstance(entry, Mapping) else {} for entry in table]
+    called = [entry.get("label", entry.get("name")) for entry in entries]
+    names = [entry.get("name") for entry in entries]
+    return called.index(part) if part in called else names.index(part) if part in names else None
 
 
 def read_value(text: str) -> Any:

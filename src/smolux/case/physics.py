@@ -258,6 +258,8 @@ def _processes(content: Any, problems: Problems) -> list[dict[str, Any]]:
 
 def _of_process(kind: type[Process], key: str) -> str:
     """Return in words what a parameter of a process may be."""
+    if key == "label":
+        return 'a text such as "wall"'
     variable = getattr(kind, "variables", {"rate": "t"}).get(key)
     if variable == "t":
         return 'a number or a formula in t such as "0.01*(1 - t/400)"'

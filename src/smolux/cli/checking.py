@@ -70,7 +70,8 @@ def description(case: Case) -> list[str]:
     """Lines that say what is computed."""
     model, t = case.model, " s" if case.si else ""
     processes = ", ".join(
-        p.name + ("" if p.factor.constant == 1 else f" ({p.factor.text})") for p in model.processes
+        p.called + ("" if p.factor.constant == 1 else f" ({p.factor.text})")
+        for p in model.processes
     )
     tables = model_tables(model, case.si)
     lines = [f"title        {case.title}"] if case.title else []

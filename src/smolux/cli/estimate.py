@@ -271,7 +271,7 @@ def negative_rates(case: Case) -> list[str]:
         if wrong.any():
             t = times[np.argmax(wrong)]
             found.append(
-                f"the rate of {process.name}, {factor.text}, is {float(factor(float(t))):.3g} at "
+                f"the rate of {process.called}, {factor.text}, is {float(factor(float(t))):.3g} at "
                 f"t = {t:.6g}; it must be a finite number, zero or more, up to the last time: "
                 f'for example "max(0, {factor.text})"'
             )
@@ -358,7 +358,7 @@ def _population_warnings(run: Run, small: Pilot) -> list[str]:
 def _breakage(case: Case, run: Run) -> list[str]:
     """Warn of breakage that may make far more particles than there are at the start."""
     keeping = Aggregation, Removal, Source
-    names = [p.name for p in case.model.processes if not isinstance(p, keeping)]
+    names = [p.called for p in case.model.processes if not isinstance(p, keeping)]
     times = mean_size(case)
     if not names or times < _MANY or run.weighting != "number":
         return []

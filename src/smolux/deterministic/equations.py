@@ -120,7 +120,8 @@ class Equations:
             term.add(p, self._factor(p, times), n, meeting, flow)
         self._beyond = [None if m.beyond is None else m.beyond[-1] for m in meetings]
         if self._gel is not None:
-            self._to_gel(n, self._factor(0, times), flow)
+            for p in range(len(self.pairs)):  # which all aggregate
+                self._to_gel(p, self._factor(p, times), n, flow)
         if self.cut:
             flow.leave()
         return flow.rates, flow.along
@@ -139,13 +140,13 @@ class Equations:
         found = zip(weights, self._beyond, strict=True)
         return np.asarray(sum(w * b for w, b in found if b is not None))
 
-    def _to_gel(self, n: Float, factor: Float, flow: Flow) -> None:
+    def _to_gel(self, p: int, factor: Float, n: Float, flow: Flow) -> None:
         """Let the mass beyond the window take up particles."""
         assert self._gel is not None
         lost = n * self._gel * (factor * (self.mass - n @ self.sizes))[:, None]
         events = lost.sum(axis=1)
         flow.rates -= lost
-        flow.events[:, 0] += events
+        flow.events[:, p] += events
         flow.number -= events
         flow.over_mass += lost @ self.sizes
 
@@ -154,7 +155,7 @@ class Equations:
         law = self._factors[p]
         if law.constant is not None:
             return np.full(len(times), law.constant)
-        return factor_at(law, np.clip(times, *self.span), f"the rate of {self.processes[p].name}")
+        return factor_at(law, np.clip(times, *self.span), f"the rate of {self.processes[p].called}")
 
     def conserves(self, n: Float) -> bool:
         """Whether no mass leaves at a rate that depends on what is there."""

@@ -144,7 +144,7 @@ class Observer:
         records = Records(
             times=np.array(times),
             orders=self.orders,
-            processes=tuple(process.name for process in processes),
+            processes=tuple(process.called for process in processes),
             bin_edges=np.append(self.edges.astype(float), 2.0**62)[: bins + 1],
             values=values,
         )

@@ -142,7 +142,7 @@ def steady_state(
     """
     window = renamed("window", window, "largest", largest)
     model = frozen(model)
-    varying = [p.name for p in model.processes if p.factor.constant is None]
+    varying = [p.called for p in model.processes if p.factor.constant is None]
     if varying:
         raise InputError(
             f"process {varying[0]!r}: its rate depends on time, so there is no steady state; "

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..processes.base import PairProcess
 from .additive import Additive
 from .base import Solution
 from .bilinear import Bilinear
@@ -67,11 +66,14 @@ def solution(model: Model, *, gel: Literal["reacts", "inert"] = "reacts") -> Sol
 
 def _rates(model: Model) -> tuple[float, float] | None:
     """Return the rate of aggregation and that of shattering relative to it, if constant."""
-    if any(isinstance(p, PairProcess) and p.shared is not None for p in model.processes):
-        return None
-    factors = {process.name: process.factor.constant for process in model.processes}
-    aggregation, shattering = factors.pop("aggregation", None), factors.pop("shattering", 0.0)
-    if factors or not aggregation or shattering is None:
+    rates = {"aggregation": 0.0, "shattering": 0.0}
+    for process in model.processes:
+        factor = process.factor.constant
+        if process.name not in rates or factor is None or process.shared is not None:  # type: ignore[attr-defined]
+            return None
+        rates[process.name] += factor  # two of a kind are as one with the sum of their rates
+    aggregation, shattering = rates["aggregation"], rates["shattering"]
+    if not aggregation:
         return None
     return aggregation, shattering / aggregation
 

@@ -31,6 +31,8 @@ class Aggregation(PairProcess):
         A function f of time by which the rate is multiplied, such as the share of encounters in
         which the particles stick, or the shear rate of a flow that slows down. Where nothing else
         happens, this is the same as another time, ``ds = f dt``.
+    label : str, optional
+        What it is called in results, if not by its name.
 
     share : float, callable or str
         The share of the encounters in which the particles stick, between 0 and 1: a number, a

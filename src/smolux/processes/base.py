@@ -25,17 +25,28 @@ Float = NDArray[np.float64]
 class Process:
     """Something that changes the population; see `PairProcess`, `LoneProcess` and `Source`.
 
+    Parameters
+    ----------
+    label : str, optional
+        What it is called in results, if not by its name: so that two of a kind are told apart.
+
     Attributes
     ----------
     name : str
-        The name in case files and results.
+        The name in case files.
     """
 
+    label: str | None = field(default=None, kw_only=True, repr=False)
     name: ClassVar[str]
     #: order among the processes of a model: pairs, single particles, sources
     kind: ClassVar[int]
     #: whether it takes mass in or out
     opens: ClassVar[bool] = False
+
+    @property
+    def called(self) -> str:
+        """The name in results and messages: the label, if there is one."""
+        return self.name if self.label is None else self.label
 
     @property
     def entries(self) -> int:
@@ -72,7 +83,7 @@ class PairProcess(Process):
         if is_number(self.share) and self.share == 1.0:
             return None
         with about("share"):
-            return share_law(self.share, f"the share of {self.name}")
+            return share_law(self.share, f"the share of {self.called}")
 
     @property
     def parameters(self) -> tuple[Any, ...]:

@@ -37,6 +37,8 @@ class Evaporation(RatedBySize, LoneProcess):
         values for k = 1, 2, ... (of which the first is not used, and the last holds beyond).
     varying : float, callable or str
         A function of time by which the rate is multiplied.
+    label : str, optional
+        What it is called in results, if not by its name.
 
     References
     ----------

@@ -44,6 +44,8 @@ class Fragmentation(Varying, LoneProcess):
         `smolux.kernels`. Symmetric and never negative.
     varying : float, callable or str
         A function of time by which the rate is multiplied.
+    label : str, optional
+        What it is called in results, if not by its name.
 
     References
     ----------

@@ -29,6 +29,8 @@ class Removal(RatedBySize, LoneProcess):
         Particles of sizes above this leave at once.
     varying : float, callable or str
         A function of time by which the rate is multiplied.
+    label : str, optional
+        What it is called in results, if not by its name.
     """
 
     rate: Any = 0.0

@@ -33,6 +33,8 @@ class Shattering(PairProcess):
     share : float, callable or str
         The share of these encounters in which that happens, between 0 and 1: a number, a function
         of both sizes, or a formula in i and j.
+    label : str, optional
+        What it is called in results, if not by its name.
 
     References
     ----------

@@ -24,6 +24,8 @@ class Source(Varying, Process):
         The rate for monomers, or sizes and their rates: ``{1: 1.0, 10: 0.1}``.
     varying : float, callable or str
         A function of time by which the rates are multiplied.
+    label : str, optional
+        What it is called in results, if not by its name.
 
     References
     ----------
