@@ -42,6 +42,7 @@ PROCESS = {
     ("source", "rates"): (2, {"1": 1, "3": 0.25}),
     ("source", "varying"): OF_TIME,
 }
+LABEL = ("wall",)
 INITIAL = {"density": (1, 2.5), "mean": (3,), "median": (5,), "sigma": (1.3,), "size": (1, 7)}
 SETTINGS = {
     "particles": (2000,), "replicas": (3,), "seed": (0, 2**70), "method": ("auto",),
@@ -76,7 +77,9 @@ def tables(draw, kernel, process, initial, si):
     section = {"kernel": "kernel", "initial": "initial"} if si else {}
     law = drawn(draw, kernel, KERNEL.__getitem__, section.get("kernel"))
     case = {"kernel": {"name": kernel.name, **law}}
-    found = drawn(draw, process, lambda key: PROCESS[process.name, key])
+    found = drawn(
+        draw, process, lambda key: LABEL if key == "label" else PROCESS[process.name, key]
+    )
     if process.name == "removal" and not ({"rate", "above"} & set(found)):
         found["rate"] = 0.1
     case["processes"] = [{"name": "aggregation"}] if draw(st.booleans()) else []
