@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -118,8 +119,33 @@ class Kernel:
         -------
         lower, upper : ndarray
             ``lower <= K(i, j) <= upper`` for every real pair in the box.
+
+        Notes
+        -----
+        A law that does not state them has those of its rate: by intervals, or where these find
+        none by trial, see `smolux.kernels.from_function`.
         """
-        raise NotImplementedError
+        return self._by_rate.bounds(a, b, c, d)
+
+    @cached_property
+    def _by_rate(self) -> Kernel:
+        """The law as a function of the user, of which nothing is known but the rate."""
+        from .function import from_function
+
+        rate, parameters = self.rate, self.parameters
+
+        def law(i: Any, j: Any) -> Any:
+            return rate(i, j, *parameters)
+
+        return from_function(law)
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        super().__init_subclass__(**given)
+        if cls.bounds is Kernel.bounds:
+            # what is known of bounds that are found from the rate depends on the rate
+            for name in ("rigorous", "searched", "singled_out"):
+                if name not in vars(cls):
+                    setattr(cls, name, property(partial(_of_rate, name)))
 
     def interval(self, i: Interval, j: Interval) -> Interval:
         """Bounds of the law over intervals of sizes, the best only where these are small.
@@ -215,6 +241,10 @@ class Kernel:
             "gels": self.gels,
             "reference": self.reference,
         }
+
+
+def _of_rate(name: str, kernel: Kernel) -> Any:
+    return getattr(kernel._by_rate, name)
 
 
 def check_parameters(kernel: Kernel, zero: bool = False, **ranges: tuple[float, float]) -> None:
