@@ -132,6 +132,19 @@ def test_the_rate_equations_have_a_sum_for_each_share(method):
     np.testing.assert_allclose(found["events"], expected["events"], rtol=2e-8)
 
 
+@pytest.mark.filterwarnings("default:from t = 3 on mass lies beyond:smolux.errors.SmoluxWarning")
+def test_a_gel_reacts_by_every_share():
+    """Two aggregations, a quarter and a half of the encounters: three quarters together."""
+    two = [P.Aggregation(share=0.25), P.Aggregation(share="0.5 + 0*i*j", label="more")]
+    model = sx.Model(sx.kernels.Multiplicative(), two)
+    given = {"times": [0.5, 3.0], "gel": "reacts", "orders": [0, 1], "window": 500}
+    ds = sx.solve(model, **given)
+    expected = sx.solve(sx.Model(sx.kernels.Multiplicative(0.75)), **given)
+    np.testing.assert_allclose(ds["moment"], expected["moment"], rtol=1e-6)
+    events = ds["events"][0, 1].values
+    assert events[0] == pytest.approx(events[1] / 2, rel=1e-6)
+
+
 def test_steady_states_with_shares():
     share = P.Shattering(0.2, share="5/(5 + i + j)")
     one = steady_state(

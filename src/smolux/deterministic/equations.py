@@ -70,7 +70,10 @@ class Equations:
         self._terms = [term_of(process, self.sizes) for process in self.processes]
         self._bands: dict[tuple[float, ...], Float] = {}
         self._beyond: list[Float | None] = []
-        self._gel = gel_affinity(self.model.kernel, self.sizes) if self._gel_reacts else None
+        #: of each law of encounters, if the gel reacts
+        self._gel = [
+            gel_affinity(law, self.sizes) for law in self.encounters.laws if self._gel_reacts
+        ]
 
     def refine(self, n: Float) -> bool:
         """Find the sums over pairs more exactly near densities `n`; see `Encounters.refine`."""
@@ -119,7 +122,7 @@ class Equations:
             meeting = meetings[self.encounters.law_of(p)]
             term.add(p, self._factor(p, times), n, meeting, flow)
         self._beyond = [None if m.beyond is None else m.beyond[-1] for m in meetings]
-        if self._gel is not None:
+        if self._gel:
             for p in range(len(self.pairs)):  # which all aggregate
                 self._to_gel(p, self._factor(p, times), n, flow)
         if self.cut:
@@ -142,8 +145,8 @@ class Equations:
 
     def _to_gel(self, p: int, factor: Float, n: Float, flow: Flow) -> None:
         """Let the mass beyond the window take up particles."""
-        assert self._gel is not None
-        lost = n * self._gel * (factor * (self.mass - n @ self.sizes))[:, None]
+        gel = self._gel[self.encounters.law_of(p)]
+        lost = n * gel * (factor * (self.mass - n @ self.sizes))[:, None]
         events = lost.sum(axis=1)
         flow.rates -= lost
         flow.events[:, p] += events
@@ -161,7 +164,7 @@ class Equations:
         """Whether no mass leaves at a rate that depends on what is there."""
         if any(isinstance(term, Leaving) and term.vanishing.any() for term in self._terms):
             return False
-        return self._gel is None or self.mass - float(n @ self.sizes) <= _NO_GEL * self.mass
+        return not self._gel or self.mass - float(n @ self.sizes) <= _NO_GEL * self.mass
 
     def _weights(self, t: float) -> tuple[list[float], list[float]]:
         """Return how often loss and gain of each law of encounters enter the rates.
@@ -195,8 +198,8 @@ class Equations:
         """
         losses, gains = self._weights(t)
         count, loss = self._near(losses, n, _LEFT_OUT / h)
-        if self._gel is not None:
-            loss = loss + losses[0] * self._gel * (self.mass - float(n @ self.sizes))
+        for weight, gel in zip(losses, self._gel, strict=bool(self._gel)):
+            loss = loss + weight * gel * (self.mass - float(n @ self.sizes))
         return loss + self.lone_losses(t), self._columns(gains, count) * n[:count]
 
     def lone_losses(self, t: float) -> Float:

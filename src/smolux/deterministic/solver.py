@@ -244,7 +244,7 @@ class Run:
         model, settings, cut = self.model, self.settings, self.model.cut
         largest, given = largest_size(model), settings.window or settings.max_window
         if given is None:
-            hindered = len(model.processes) > 1
+            hindered = not model.only_aggregates
             limit = usual_limit(largest // unit, self._may_gel, hindered, self.encounters.direct)
         else:
             limit = max(given // unit, 1)
