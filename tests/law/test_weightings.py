@@ -282,12 +282,12 @@ def test_short_forms_are_the_definition(weighting: Any) -> None:
 
 
 def test_a_weight_that_falls() -> None:
-    """From sizes that weigh next to nothing, and less when they have merged: 1/(1 + t/2)."""
+    """It rises up to two merged particles, of sizes far above one, then falls: 1/(1 + t/2)."""
     start = sx.initial.monodisperse(size=3000)
     ds = sx.simulate(
         laws.model("constant", initial=start), [5.0], method="acceptance-rejection",
-        weighting=sx.weighting.WeightFunction("1/(1 + l)"), particles=1000, replicas=32, seed=37,
-        sizes=1, bins_per_octave=1,
+        weighting=sx.weighting.WeightFunction("(l/3000)**3 / (1 + (l/6500)**8)"), particles=1000,
+        replicas=32, seed=37, sizes=1, bins_per_octave=1,
     )  # fmt: skip
     laws.agree(ds["number_density"].values[:, 0], 2.0 / 7.0)
     laws.agree(ds["moment"].sel(order=1).values, 3000.0)

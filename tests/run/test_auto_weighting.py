@@ -13,7 +13,7 @@ import pytest
 import smolux as sx
 from shared import FORMULA
 from smolux import case as cases
-from smolux import checkpoint, pilot
+from smolux import checkpoint, pilot, planning
 from smolux.cli import running
 from smolux.costing import event_cost
 from smolux.errors import InputError
@@ -140,7 +140,9 @@ def test_the_choice_goes_into_checkpoints(tmp_path: Any) -> None:
     assert stored == settled
 
 
-def test_a_begun_run_is_known_by_what_was_asked_for() -> None:
+def test_a_begun_run_is_known_by_what_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    chosen = sx.weighting.MassFlow(), "in a pilot"
+    monkeypatch.setattr(planning, "chosen_weighting", lambda model, settings: chosen)
     text = '[kernel]\nname = "constant"\n[run]\ntimes = [4]\nseed = 5\nweighting = '
     for asked in (
         '"auto"\ntarget = "n_50"', '"weight-function"\nexponent = 0.5', '"mass-flow"'

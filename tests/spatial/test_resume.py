@@ -58,6 +58,8 @@ def test_what_is_reached_already():
 @stopped
 def test_ctrl_c_leaves_what_was_reached(monkeypatch):
     """It comes while the compiled loop runs; the events of that loop must not be lost."""
+    # which is ignored by what a shell runs in the background
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     s = sp.lattice(40_000, 0.1, seed=1)
     monkeypatch.setattr("smolux.spatial.running._BUDGET", 8000)
     advance = WindowedRun.advance

@@ -66,8 +66,8 @@ def _made(given: Any, what: str, zero: bool) -> Kernel:
         return formula(given)
     if is_number(given):
         if not 0.0 < given < np.inf and not (zero and given == 0.0):
-            least = "zero or more" if zero else "above zero"
-            raise InputError(f"{what} = {given!r}: must be a finite number, {least}")
+            least = ", zero or more" if zero else " above zero"
+            raise InputError(f"{what} = {given!r}: must be a finite number{least}")
         return Constant(float(given))
     if callable(given):
         return from_function(given)
