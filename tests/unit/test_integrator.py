@@ -335,3 +335,19 @@ def test_all_mistakes_at_once():
         sx.solve(equations().model, [1], gel="reacts")
     with pytest.raises(InputError, match="grows faster"):
         sx.solve(sx.Model(sx.kernels.Product(1.5)), [1], gel="reacts")
+
+
+def test_rates_that_vary_do_not_gather_what_was_computed():
+    """Each time has factors of its own; the rates of the kernel are found once for all of them."""
+    eq, calls = equations(rate="0.1 + 0.05*sin(t)", m=300), []
+    operator = eq.encounters._operators[0]
+    columns = operator.columns
+    operator.columns = lambda count: calls.append(count) or columns(count)
+    n = 0.5 ** np.arange(1.0, 301.0)
+    for t in np.linspace(0.0, 5.0, 40):
+        loss, bands = eq.jacobian(float(t), n, 0.1)
+    assert len(calls) <= 2
+    # with the factors of the time: all partners, and those that merge
+    near = eq.encounters.near([1.1 + 0.05 * np.sin(5.0)], n, bands.shape[1])
+    np.testing.assert_allclose(loss, near, rtol=1e-12)
+    np.testing.assert_allclose(bands, columns(bands.shape[1]) * n[: bands.shape[1]], rtol=1e-12)

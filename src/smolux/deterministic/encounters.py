@@ -18,6 +18,8 @@ from .operator import Direct, Operator, OperatorFactory
 
 Float = NDArray[np.float64]
 
+#: partners whose rates are found together
+_BANDS = 32
 #: the largest window on which low rank gives way to the direct sum
 DIRECT_MOST = 1 << 13
 
@@ -63,6 +65,8 @@ class Encounters:
             OperatorFactory(on_multiples(law, unit), method, tolerance) for law in self.laws
         ]
         self._operators: list[Operator] = []
+        #: of each law the rates with small partners that were asked for so far
+        self._known: list[Float] = []
         self._tilted = False
 
     @property
@@ -78,6 +82,7 @@ class Encounters:
     def resize(self, count: int) -> None:
         """Take another number of sizes."""
         self._operators = [factory(count) for factory in self._factories]
+        self._known = [np.empty((count, 0)) for _ in self._factories]
         self._tilted = False
 
     @property
@@ -117,6 +122,7 @@ class Encounters:
             return False
         for k in rough:
             self._operators[k] = self._factories[k].direct_sum(len(n))
+            self._known[k] = np.empty((len(n), 0))
         return True
 
     def closed(self) -> None:
@@ -143,10 +149,23 @@ class Encounters:
         found = zip(weights, self._operators, strict=True)
         return np.asarray(sum(w * operator.loss(n[None, :])[0] for w, operator in found))
 
-    def columns(self, weights: Sequence[float], count: int) -> Float:
-        """Return ``K(i, j)`` of all laws for ``j = 1 .. count``, each times its weight."""
-        found = zip(weights, self._operators, strict=True)
-        return np.asarray(sum(w * operator.columns(count) for w, operator in found))
+    def near(self, weights: Sequence[float], n: Float, count: int) -> Float:
+        """Return what `loss` does by partners of the sizes ``1 .. count`` alone."""
+        found = (w * (self._columns(k, count) @ n[:count]) for k, w in enumerate(weights))
+        return np.asarray(sum(found))
+
+    def merging_by(self, weights: Sequence[float], n: Float, count: int) -> Float:
+        """Return ``K(i, j) n_j`` of all laws for ``j = 1 .. count``, each times its weight."""
+        found = (w * (self._columns(k, count) * n[:count]) for k, w in enumerate(weights))
+        return np.asarray(sum(found))
+
+    def _columns(self, k: int, count: int) -> Float:
+        """Return the rates of law `k` with the sizes ``1 .. count``."""
+        if self._known[k].shape[1] < count:
+            # one is often enough; where it is not, more will be asked for
+            more = 1 if count == 1 else max(count, min(_BANDS, len(self._known[k])))
+            self._known[k] = self._operators[k].columns(more)
+        return self._known[k][:, :count]
 
     def beyond(self, weights: Sequence[float], n: Float) -> Float:
         """Return the gain of the sizes ``M + 1 .. 2 M`` of all laws, each times its weight."""

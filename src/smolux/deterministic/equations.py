@@ -68,7 +68,6 @@ class Equations:
         self.sizes = self.unit * np.arange(1.0, count + 1.0)
         self.encounters.resize(count)
         self._terms = [term_of(process, self.sizes) for process in self.processes]
-        self._bands: dict[tuple[float, ...], Float] = {}
         self._beyond: list[Float | None] = []
         #: of each law of encounters, if the gel reacts
         self._gel = [
@@ -77,7 +76,6 @@ class Equations:
 
     def refine(self, n: Float) -> bool:
         """Find the sums over pairs more exactly near densities `n`; see `Encounters.refine`."""
-        self._bands = {}
         return self.encounters.refine(n)
 
     @property
@@ -182,7 +180,7 @@ class Equations:
 
     def gain_by(self, t: float, n: Float, count: int) -> Float:
         """Return how particles merge with those of the sizes ``1 .. count``, shape (M, count)."""
-        return self.encounters.columns(self._weights(t)[1], count) * n[:count]
+        return self.encounters.merging_by(self._weights(t)[1], n, count)
 
     def overflow(self, t: float, n: Float) -> Float:
         """Return what `beyond` does, from these densities."""
@@ -198,9 +196,11 @@ class Equations:
         """
         losses, gains = self._weights(t)
         count, loss = self._near(losses, n, _LEFT_OUT / h)
-        for weight, gel in zip(losses, self._gel, strict=bool(self._gel)):
-            loss = loss + weight * gel * (self.mass - float(n @ self.sizes))
-        return loss + self.lone_losses(t), self._columns(gains, count) * n[:count]
+        if self._gel:
+            missing = self.mass - float(n @ self.sizes)
+            for weight, gel in zip(losses, self._gel, strict=True):
+                loss = loss + weight * gel * missing
+        return loss + self.lone_losses(t), self.encounters.merging_by(gains, n, count)
 
     def lone_losses(self, t: float) -> Float:
         """Return the rate at which a particle of each size vanishes by itself, shape (M,)."""
@@ -215,11 +215,8 @@ class Equations:
         total = self.encounters.loss(weights, n)
         most = min(_BANDS, self.count)
 
-        def near(count: int) -> Float:
-            return np.asarray(self._columns(weights, count) @ n[:count])
-
         def left_out(count: int) -> float:
-            return float(np.max(total - near(count)))
+            return float(np.max(total - self.encounters.near(weights, n, count)))
 
         count = 1
         if left_out(1) > enough and most > 1:
@@ -227,11 +224,6 @@ class Equations:
             least = 1.5 * left_out(most)
             while 2 * count <= most and left_out(count) > max(enough, least):
                 count *= 2
-        return count, total if left_out(count) > enough else near(count)
-
-    def _columns(self, weights: list[float], count: int) -> Float:
-        known = self._bands.get(tuple(weights))
-        if known is None or known.shape[1] < count:
-            known = self.encounters.columns(weights, 1 if count == 1 else min(_BANDS, self.count))
-            self._bands = {**self._bands, tuple(weights): known}
-        return known[:, :count]
+        if left_out(count) > enough:
+            return count, total
+        return count, self.encounters.near(weights, n, count)
