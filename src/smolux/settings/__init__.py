@@ -5,8 +5,8 @@ declarations. A new argument is a field here and in the signature of its functio
 """
 
 from .control import Control
-from .kinds import checked, from_plain, plain
+from .kinds import from_plain, plain
 from .simulation import PILOT, Settings
 from .solution import SolverSettings
 
-__all__ = ["PILOT", "Control", "Settings", "SolverSettings", "checked", "from_plain", "plain"]
+__all__ = ["PILOT", "Control", "Settings", "SolverSettings", "from_plain", "plain"]

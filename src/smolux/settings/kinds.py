@@ -36,7 +36,7 @@ class Kind:
         """Return a value as numbers, texts, lists and tables."""
         return list(value) if isinstance(value, tuple) else value
 
-    def from_plain(self, value: Any) -> Any:
+    def from_plain(self, key: str, value: Any) -> Any:
         """Return the value of which `plain` has made this."""
         return value
 
@@ -153,14 +153,15 @@ class Registered(Kind):
             )
         return {"name": value.name, **settings}
 
-    def from_plain(self, value: Any) -> Any:
+    def from_plain(self, key: str, value: Any) -> Any:
         """See `Kind`."""
         if isinstance(value, str):
             return value
         settings = dict(value)
         name, entries = settings.pop("name"), self._entries()
         if name not in entries:
-            raise InputError(f"{name!r}: unknown{did_you_mean(str(name), list(entries))}")
+            cure = f"is unknown{did_you_mean(str(name), list(entries))}"
+            raise InputError([Problem(key, cure, name)])
         return entries[name](**settings)
 
 
@@ -177,7 +178,7 @@ class Flag(Kind):
 class _Sequence(Kind):
     """Numbers kept as a tuple."""
 
-    def from_plain(self, value: Any) -> Any:
+    def from_plain(self, key: str, value: Any) -> Any:
         """See `Kind`."""
         return tuple(value)
 
@@ -296,4 +297,4 @@ def plain(table: Any, settings: Any) -> dict[str, Any]:
 def from_plain(table: Any, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the arguments of settings that `plain` has written."""
     found = kinds(table)
-    return {name: found[name].from_plain(value) for name, value in given.items()}
+    return {name: found[name].from_plain(name, value) for name, value in given.items()}
