@@ -5,9 +5,11 @@ Where a unit is one, a factor that is missing is not missed. The loops are those
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import lru_cache
 from typing import Any
 
+import chains
 import laws
 import numpy as np
 import pytest
@@ -82,13 +84,13 @@ def test_few_particles(method: str, case: int) -> None:
 #: two sizes, the largest of their classes, levels and slots among them, and a law
 PAIRS = {
     "31-31": ((31, 31), "multiplicative"),
-    "6-7": ((6, 7), "multiplicative"),
+    "7-7": ((7, 7), "multiplicative"),
     "3-7": ((3, 7), "ballistic"),
     "1-30000": ((1, 30_000), "multiplicative"),
 }
 #: a small and a large size meet in `test_wide_rates`, too, by each method
 PAIRS_QUICK = {
-    *((m, pair) for m in METHODS if m != "fictitious-jumps" for pair in ("31-31", "6-7", "3-7")),
+    *((m, pair) for m in METHODS if m != "fictitious-jumps" for pair in ("31-31", "7-7", "3-7")),
     ("acceptance-rejection", "1-30000"),
     ("low-rank", "1-30000"),
 }
@@ -148,6 +150,52 @@ def test_after_hundreds_of_events(method: Any) -> None:
     _, p = exact.finite.partition_pmf(laws.kernel("ballistic"), particles, clock, shattering=5.0)
     found = laws.chi_square(laws.partition_counts(ds, particles, 0), replicas * p)
     assert found > laws.RARE
+
+
+#: four particles whose clusters tell who has merged
+DIFFERENT = (1, 5, 12, 30)
+
+
+@lru_cache
+def clusters(law: str, end: float) -> tuple[dict[tuple[int, ...], int], laws.Float]:
+    """The fifteen states that `DIFFERENT` may reach, and their probabilities."""
+    rate, volume = laws.kernel(law), len(DIFFERENT) / DENSITY
+    moves = chains.pairs(lambda i, j: float(rate(i, j)), lambda k: 1.0, volume)
+    place, p = chains.law(DIFFERENT, moves, (end,), len(DIFFERENT))
+    return place, p[0, :-1]
+
+
+@pytest.mark.parametrize(
+    ("method", "law", "end"),
+    [
+        *(pytest.param(*m.values, "ballistic", 0.04, marks=m.marks, id=m.values[0]) for m in EVERY),
+        *(pytest.param(m, "ballistic", 0.04, id=str(m)) for m in STRAINED),
+        pytest.param(STRAINED[1], "multiplicative", 0.006, id=f"{STRAINED[1]}-multiplicative"),
+    ],
+)
+def test_who_merges(method: Any, law: str, end: float) -> None:
+    """Small and large, one after the other: what is left behind of the first is not lost."""
+    replicas = 4000
+    place, p = clusters(law, end)
+    model = laws.model(law, 0.0, start(*DIFFERENT))
+    ds = fixed(model, end, method, 4, replicas=replicas, sizes=sum(DIFFERENT), seed=71)
+    counts = np.rint(ds["n"].values[:, 0] * ds["volume"].values[0, 0]).astype(int)
+    sizes = np.arange(1, sum(DIFFERENT) + 1)
+    found = Counter(tuple(np.repeat(sizes, row)) for row in counts)
+    observed = [found[state] for state in place]
+    assert sum(observed) == replicas
+    assert laws.chi_square(observed, replicas * p) > laws.RARE
+
+
+@every_method
+def test_those_that_have_come_meet_others(method: str) -> None:
+    """In the first events there are clusters of three, made of those that were not there before."""
+    particles, clock = 400, 0.4
+    model = laws.model("constant", 0.0, sx.initial.monodisperse(DENSITY))
+    ds = fixed(model, clock / DENSITY, method, particles, replicas=100, sizes=4, seed=72)
+    law = exact.finite.law("constant", particles)
+    expected = law.counts(clock, np.arange(1, 5)) / ds["volume"].values[0, 0]
+    laws.agree(ds["n"].values[:, 0], expected)
 
 
 @pytest.mark.parametrize("method", QUICK)

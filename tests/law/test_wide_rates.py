@@ -22,7 +22,7 @@ END = 1e12
 
 
 #: one law for all tests, so that they share their loops
-FORMULA = "c0 + c1*min(1, max(0, min(i, j) - 9)) + c2*(i*j)**power + c3*(i - j)**2"
+FORMULA = "c0 + c1*min(1, max(0, min(i, j) - 10)) + c2*(i*j)**power + c3*(i - j)**2"
 
 every_method = pytest.mark.parametrize("method", [method.name for method in METHODS])
 every_but_fictitious = pytest.mark.parametrize("method", EVERY)
@@ -37,7 +37,7 @@ def _kernel(
 @pytest.mark.parametrize("method", ["inverse", "size-class"])
 def test_rates_over_24_decades(method: str) -> None:
     kernel = _kernel(c0=1e-12, c1=1e12)
-    start = sx.initial.from_sizes({1: 4 / 7, 10: 3 / 7})
+    start = sx.initial.from_sizes({1: 4 / 7, 11: 3 / 7})
     ds = sx.simulate(
         sx.Model(kernel, initial=start), [END], method=method, population="fixed-volume",
         particles=7, replicas=4000, bins_per_octave=1, seed=1,
@@ -45,9 +45,23 @@ def test_rates_over_24_decades(method: str) -> None:
     volume = float(ds["volume"][0, 0])
     # what merges at once has merged: the exponential of the other rates is left
     moves = chains.pairs(lambda i, j: 1e-12, lambda k: 1.0, volume)
-    place, p = chains.law((1, 1, 1, 1, 30), moves, (END,), 5)
+    place, p = chains.law((1, 1, 1, 1, 33), moves, (END,), 5)
     mean = sum(p[0][k] * len(state) for state, k in place.items())
     laws.agree(ds["particles"].values[:, 0], mean, method)
+
+
+@every_method
+def test_the_largest_of_a_class_alone_has_a_rate(method: str) -> None:
+    """The size 11 with itself, and no smaller one: two of it merge a million times before the end.
+
+    One replica, as what it finds out about bounds serves the others.
+    """
+    kernel = _kernel(c0=1e-12, c1=1e6)
+    ds = sx.simulate(
+        sx.Model(kernel, initial=sx.initial.monodisperse(size=11)), [1e2], method=method,
+        population="fixed-volume", particles=2, replicas=1, bins_per_octave=1, seed=6,
+    )  # fmt: skip
+    assert ds["extinction_time"].item() < 1e-4
 
 
 @pytest.mark.parametrize(
@@ -73,6 +87,23 @@ def test_a_lone_particle_does_not_meet_itself(
     place, p = chains.law(sizes, moves, (end,), n)
     mean = sum(p[0][k] * len(state) for state, k in place.items())
     assert 1.2 < mean < n - 0.2
+    laws.agree(ds["particles"].values[:, 0], mean, method)
+
+
+@pytest.mark.parametrize("method", ["inverse", "low-rank"])
+def test_the_small_rates_of_particles_that_had_large_ones(method: str) -> None:
+    """Of giants with a dwarf that merges at once: 1e16 times those that are left, and rounded."""
+    steep, giant, end = -6.0, 600, 1e33
+    start = sx.initial.from_sizes({1: 0.2, giant: 0.8})
+    ds = sx.simulate(
+        sx.Model(_kernel(c2=1.0, power=steep), initial=start), [end], method=method,
+        population="fixed-volume", particles=5, replicas=2000, bins_per_octave=1, seed=5,
+    )  # fmt: skip
+    volume = float(ds["volume"][0, 0])
+    moves = chains.pairs(lambda i, j: float(i * j) ** steep, lambda k: 1.0, volume)
+    place, p = chains.law((giant, giant, giant, giant + 1), moves, (end,), 4)
+    mean = sum(p[0][k] * len(state) for state, k in place.items())
+    assert 1.2 < mean < 3.8
     laws.agree(ds["particles"].values[:, 0], mean, method)
 
 
