@@ -30,7 +30,7 @@ _UNREADABLE = (
 
 #: raised whenever the content of a checkpoint changes; columns of state and tally speak for
 #: themselves
-VERSION = 5
+VERSION = 6
 
 
 def _plan_to_dict(plan: Plan) -> dict[str, Any]:

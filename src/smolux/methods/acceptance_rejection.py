@@ -117,13 +117,10 @@ class AcceptanceRejection(Method):
                 state.clock[replica, VALUE] = value
                 count[WORST_I], count[WORST_J] = smallest, largest
 
-    def population(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
-        """See `Method.population`."""
+    def held(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
+        """See `Method.held`."""
         count = state.count[replica]
-        sizes, counts = np.unique(work.sizes[replica, : count[STORED]], return_counts=True)
-        if count[MONOMERS]:
-            sizes, counts = np.append(1, sizes), np.append(count[MONOMERS], counts)
-        return sizes.astype(np.int64), counts.astype(np.int64)
+        return np.array([0, count[MONOMERS]]), work.sizes[replica, : count[STORED]]
 
     def bytes_per_replica(self, particles: int) -> int:
         """See `Method.bytes_per_replica`."""

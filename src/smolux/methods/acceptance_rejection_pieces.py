@@ -32,6 +32,7 @@ from ..core.state import (
     VALUE,
     VOLUME,
 )
+from ..core.store import Store, pieces_of
 from ..core.together import largest_rate, takes
 from .acceptance_rejection_store import (
     APART,
@@ -66,9 +67,8 @@ class Held(NamedTuple):
 
 
 @piece
-def _pair(s, w):
-    monomers = s.count[MONOMERS]
-    return size_of(w, monomers, s.count[FIRST]), size_of(w, monomers, s.count[SECOND])
+def _size(s, w, place):
+    return size_of(w, s.count[MONOMERS], place)
 
 
 @piece
@@ -83,11 +83,6 @@ def _pick(s, w, r, c):
         if takes(s, r, size, largest):
             return s.count[MONOMERS] + k, size
         s.count[TRIALS] += 1
-
-
-@piece
-def _seize(s, w, place):
-    s.count[FIRST] = place
 
 
 @piece
@@ -251,24 +246,7 @@ def _release(s, held):
 
 
 @piece
-def _remove(s, w, slot):
-    """Take a particle out."""
-    s.count[MONOMERS], s.count[STORED] = _without(w, s.count[MONOMERS], s.count[STORED], slot)
-
-
-@piece
-def _insert(s, w, size, count):
-    if size == 1:
-        s.count[MONOMERS] += count
-        return
-    stored = s.count[STORED]
-    for k in range(count):
-        w.sizes[stored + k] = size
-    s.count[STORED] = stored + count
-
-
-@piece
-def _update(s, w, gone, entries, p):
+def _room(s, w, gone, entries, p):
     needed = np.int64(SLACK)
     for e in range(entries):
         needed += s.counts[e] if s.sizes[e] > 1 else 0
@@ -277,26 +255,37 @@ def _update(s, w, gone, entries, p):
     if w.apart[APART] == 1:
         watch(s, w, gone, entries)
     for e in range(entries):
-        s.count[PARTICLES] += s.counts[e]
         s.count[SMALLEST] = min(s.count[SMALLEST], s.sizes[e])
         note_largest(s, s.sizes[e])
-    a, b = s.count[FIRST], s.count[SECOND]
-    if gone == 3:
-        s.count[PARTICLES] -= 2
-        if entries == 1 and (s.sizes[0] == 1 or s.counts[0] == 1):
-            s.count[MONOMERS], s.count[STORED] = _exchange(
-                w, s.count[MONOMERS], s.count[STORED], a, b, s.sizes[0], s.counts[0]
-            )
-            return True
-        # monomers are numbered first: taking the later slot first keeps the number of the other
-        _remove(s, w, max(a, b))
-        _remove(s, w, min(a, b))
-    elif gone > 0:
-        _remove(s, w, a if gone == 1 else b)
-        s.count[PARTICLES] -= 1
-    for e in range(entries):
-        _insert(s, w, s.sizes[e], s.counts[e])
     return True
+
+
+@piece
+def _exchange_pair(s, w):
+    size, count = s.sizes[0], s.counts[0]
+    if size > 1 and count != 1:
+        return False
+    s.count[MONOMERS], s.count[STORED] = _exchange(
+        w, s.count[MONOMERS], s.count[STORED], s.count[FIRST], s.count[SECOND], size, count
+    )
+    return True
+
+
+@piece
+def _take(s, w, place):
+    # monomers are numbered first: the number of a particle before this one stays
+    s.count[MONOMERS], s.count[STORED] = _without(w, s.count[MONOMERS], s.count[STORED], place)
+
+
+@piece
+def _put(s, w, size, count, i, j, p):
+    if size == 1:
+        s.count[MONOMERS] += count
+        return
+    stored = s.count[STORED]
+    for k in range(count):
+        w.sizes[stored + k] = size
+    s.count[STORED] = stored + count
 
 
 @piece
@@ -343,15 +332,9 @@ def _make_visit(tally: Any) -> Any:
 def bind(rate: Any, tally: Any) -> Pieces:
     """Bind the pieces to a rate and a way to count."""
     find = _make_find(rate)
-    return Pieces(
-        view,
-        _make_draw(find),
-        _pair,
-        _update,
-        _prepare,
-        _double,
-        _pick,
-        _seize,
-        _make_visit(tally),
-        Burst(_row, _hold, find, _replace, _release),
+    store = Store(
+        view, _size, _pick, _room, _take, _put, _double, _make_visit(tally), _exchange_pair
+    )
+    return pieces_of(
+        store, _make_draw(find), _prepare, Burst(_row, _hold, find, _replace, _release)
     )

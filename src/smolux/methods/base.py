@@ -103,9 +103,19 @@ class Method:
         """Compute the bound for which the loop returned `BOUND`."""
         raise NotImplementedError
 
+    def held(self, work: Any, state: State, replica: int) -> tuple[Int, Int]:
+        """Return what a store holds: particles of each size 0, 1, ... counted, and single sizes."""
+        raise NotImplementedError
+
     def population(self, work: Any, state: State, replica: int) -> tuple[Int, Int]:
         """Return the sizes present, ascending, and their counts."""
-        raise NotImplementedError
+        counted, single = self.held(work, state, replica)
+        small = np.flatnonzero(counted)
+        large, counts = np.unique(single, return_counts=True)
+        return (
+            np.concatenate((small, large)).astype(np.int64),
+            np.concatenate((counted[small], counts)).astype(np.int64),
+        )
 
     def split(self, work: Any, state: State, parts: int, copies: int, words: Words) -> list[Any]:
         """Put every particle of a store of one replica `copies` times into one of several piles.

@@ -91,17 +91,10 @@ class Inverse(Method):
             large=enlarged(work.large, capacity), large_rate=enlarged(work.large_rate, capacity)
         )
 
-    def population(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
-        """See `Method.population`."""
-        number = work.number[replica]
-        small = np.flatnonzero(number)
-        large, counts = np.unique(
-            work.large[replica, : state.count[replica, STORED]], return_counts=True
-        )
-        return (
-            np.concatenate((small + 1, large)).astype(np.int64),
-            np.concatenate((number[small], counts)).astype(np.int64),
-        )
+    def held(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
+        """See `Method.held`."""
+        number = work.number[replica].astype(np.int64)
+        return np.append(0, number), work.large[replica, : state.count[replica, STORED]]
 
     def bytes_per_replica(self, particles: int) -> int:
         """See `Method.bytes_per_replica`."""

@@ -12,8 +12,9 @@ from ..core.bounds import note_bad, note_largest
 from ..core.compile import cold_piece, piece
 from ..core.loop import Pieces
 from ..core.state import FIRST, LARGEST, PARTICLES, SECOND, SINCE, STORED, TRIALS, VALUE, VOLUME
+from ..core.store import Store, pieces_of
 from ..core.sums import find, find_large, shift, weigh
-from .inverse_store import double, make_visit, pair, pick, remove, seize, size_at, top_of, view
+from .inverse_store import double, make_visit, pick, size_at, take, top_of, view
 
 #: events after which the sums are computed afresh, so that rounding does not pile up
 _REFRESH = 1 << 16
@@ -115,7 +116,7 @@ def _make_draw(pair_rate: Any, row_of: Any, total_of: Any) -> Any:
     def second(s, w, a, p):
         """Slot of the second particle, by its rate with the first, which is left out."""
         top, buckets, stored = top_of(s, w), w.table.shape[1], s.count[STORED]
-        size = size_at(w, a)
+        size = size_at(s, w, a)
         row = row_of(s, w, 0, size, top, p)
         if a < buckets:
             w.number[a] -= 1.0
@@ -163,7 +164,34 @@ def _make_draw(pair_rate: Any, row_of: Any, total_of: Any) -> Any:
     return draw
 
 
-def _make_update(pair_rate: Any, row_of: Any, own_rate: Any, look: Any) -> Any:
+def _make_room(own_rate: Any) -> Any:
+    @cold_piece
+    def reach(s, w, size, p):
+        """Raise the largest size to which rates are kept."""
+        old = top_of(s, w)
+        note_largest(s, size)
+        for k in range(old, top_of(s, w)):
+            w.rate[0, k] = 0.0
+        for k in range(old, top_of(s, w)):
+            w.rate[0, k] = own_rate(s, w, np.int64(k + 1), -1, p)
+
+    @cold_piece
+    def room(s, w, gone, entries, p):
+        buckets = w.table.shape[1]
+        needed = 0
+        for e in range(entries):
+            if s.sizes[e] > buckets:
+                needed += s.counts[e]
+        if s.count[STORED] + needed > w.large.shape[0]:
+            return False
+        for e in range(entries):
+            reach(s, w, s.sizes[e], p)
+        return True
+
+    return room
+
+
+def _make_put(pair_rate: Any, row_of: Any, own_rate: Any, look: Any) -> Any:
     @cold_piece
     def account(s, w, i, j, gone, size, count, p):
         """Account in all rates for `gone` of `i` and `j` each and `count` new ones of `size`."""
@@ -188,7 +216,6 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any, look: Any) -> Any:
     def arrive(s, w, size, count, p):
         """Put `count` particles of `size` in, the rates of all others being up to date."""
         buckets = w.table.shape[1]
-        s.count[PARTICLES] += count
         if size <= buckets:
             w.number[size - 1] += count
             if w.number[size - 1] == count:  # the first: its rate with itself was subtracted
@@ -205,48 +232,14 @@ def _make_update(pair_rate: Any, row_of: Any, own_rate: Any, look: Any) -> Any:
             w.large_rate[d] = own
 
     @cold_piece
-    def reach(s, w, size, p):
-        """Raise the largest size to which rates are kept."""
-        old = top_of(s, w)
-        note_largest(s, size)
-        for k in range(old, top_of(s, w)):
-            w.rate[0, k] = 0.0
-        for k in range(old, top_of(s, w)):
-            w.rate[0, k] = own_rate(s, w, np.int64(k + 1), -1, p)
-
-    @cold_piece
-    def update(s, w, gone, entries, p):
-        if entries == 0:  # what is gone is accounted for beside what appears
-            s.sizes[0], s.counts[0] = 1, 0
-            entries = 1
-        buckets = w.table.shape[1]
-        needed = 0
-        for e in range(entries):
-            if s.sizes[e] > buckets:
-                needed += s.counts[e]
-        if s.count[STORED] + needed > w.large.shape[0]:
-            return False
-        for e in range(entries):
-            reach(s, w, s.sizes[e], p)
-        a, b = s.count[FIRST], s.count[SECOND]
-        i = j = np.int64(1)
-        if gone == 3:
-            i, j = pair(s, w)
-            # the last large particle moves into a gap: the later slot first, so the other stays
-            remove(s, w, max(a, b))
-            remove(s, w, min(a, b))
-        elif gone > 0:
-            one = a if gone == 1 else b
-            i = j = size_at(w, one)
-            remove(s, w, one)
+    def put(s, w, size, count, i, j, p):
         # of both; half of either if it is one
-        share = 1.0 if gone == 3 else 0.5 if gone > 0 else 0.0
-        for e in range(entries):
-            account(s, w, i, j, share if e == 0 else 0.0, s.sizes[e], s.counts[e], p)
-            arrive(s, w, s.sizes[e], s.counts[e], p)
-        return True
+        share = 1.0 if j > 0 else 0.5 if i > 0 else 0.0
+        i = max(i, np.int64(1))
+        account(s, w, i, j if j > 0 else i, share, size, count, p)
+        arrive(s, w, size, count, p)
 
-    return update
+    return put
 
 
 def _make_renew(own_rate: Any, look: Any) -> Any:
@@ -286,14 +279,7 @@ def bind(rate: Any, tally: Any) -> Pieces:
     """Bind the pieces to a rate and a way to count."""
     pair_rate, row_of, own_rate, look = _make_rates(rate)
     renew = _make_renew(own_rate, look)
-    return Pieces(
-        view,
-        _make_draw(pair_rate, row_of, _make_total(renew)),
-        pair,
-        _make_update(pair_rate, row_of, own_rate, look),
-        _make_prepare(renew),
-        double,
-        pick,
-        seize,
-        make_visit(tally),
-    )
+    put = _make_put(pair_rate, row_of, own_rate, look)
+    store = Store(view, size_at, pick, _make_room(own_rate), take, put, double, make_visit(tally))
+    draw = _make_draw(pair_rate, row_of, _make_total(renew))
+    return pieces_of(store, draw, _make_prepare(renew), cold=True)

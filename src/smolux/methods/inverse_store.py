@@ -10,7 +10,7 @@ import numpy as np
 from ..core import rng
 from ..core.compile import cold_piece, piece
 from ..core.slots import slot_top
-from ..core.state import FIRST, LARGEST, LONE_BITS, PARTICLES, SECOND, SINCE, STORED
+from ..core.state import LARGEST, LONE_BITS, PARTICLES, SINCE, STORED
 
 
 class Work(NamedTuple):
@@ -59,16 +59,10 @@ def top_of(s, w):
 
 
 @piece
-def size_at(w, slot):
+def size_at(s, w, slot):
     """Size of the particles in a slot."""
     buckets = w.table.shape[1]
     return np.int64(slot + 1) if slot < buckets else w.large[slot - buckets]
-
-
-@piece
-def pair(s, w):
-    """Sizes of the chosen pair."""
-    return size_at(w, s.count[FIRST]), size_at(w, s.count[SECOND])
 
 
 @piece
@@ -89,13 +83,7 @@ def pick(s, w, r, c):
 
 
 @piece
-def seize(s, w, place):
-    """Make a particle the one that vanishes."""
-    s.count[FIRST] = place
-
-
-@piece
-def remove(s, w, slot):
+def take(s, w, slot):
     """Take a particle out: the last of the large ones moves into a gap."""
     buckets = w.table.shape[1]
     if slot < buckets:
@@ -104,7 +92,6 @@ def remove(s, w, slot):
         s.count[STORED] -= 1
         w.large[slot - buckets] = w.large[s.count[STORED]]
         w.large_rate[slot - buckets] = w.large_rate[s.count[STORED]]
-    s.count[PARTICLES] -= 1
 
 
 @cold_piece

@@ -23,7 +23,7 @@ from ..core.state import (
 )
 from ..errors import InputError
 from .base import Int, Method, Rates, enlarged, spread
-from .low_rank_pieces import make_draw, pair, pick, seize, update
+from .low_rank_pieces import bind
 from .low_rank_store import (
     METAS,
     POOL_NEEDED,
@@ -33,11 +33,7 @@ from .low_rank_store import (
     WANTED,
     WIDEST,
     Work,
-    double,
-    make_visit,
-    view,
 )
-from .low_rank_trees import prepare
 from .majorants import Tables, fill_bounds, fitted, from_powers, units_of
 
 #: stages of a majorant that is found: one for each octave of the largest size
@@ -88,8 +84,7 @@ class LowRank(Method):
     @staticmethod
     def bind(rate: Any, tally: Any) -> Pieces:
         """See `Method.bind`."""
-        visit = make_visit(tally)
-        return Pieces(view, make_draw(rate), pair, update, prepare, double, pick, seize, visit)
+        return bind(rate, tally)
 
     def _tables(self, rates: Rates) -> tuple[Tables, np.ndarray, int]:
         """Return tables, an array for bounds of the kernel and the bits in use."""
@@ -143,7 +138,6 @@ class LowRank(Method):
             room,
             np.tile(np.arange(slots), (replicas, 1)),
             pool,
-            np.zeros((replicas, 4), np.int64),
             meta,
             np.zeros((replicas, factors)),
             np.zeros((replicas, slots, factors)),
@@ -213,18 +207,14 @@ class LowRank(Method):
                 state.clock[replica, VALUE] = value
                 state.count[replica, (WORST_I, WORST_J)] = smallest, largest
 
-    def population(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
-        """See `Method.population`."""
+    def held(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
+        """See `Method.held`."""
         number = work.number[replica].astype(np.int64)
         counted = 2 << int(work.bits[0])
-        small = np.flatnonzero(number[:counted])
-        wide = counted + np.flatnonzero(number[counted:])
-        first = work.start[replica, wide]
-        stretches = zip(first, first + number[wide], strict=True)
-        parts = [work.pool[replica, a:b] for a, b in stretches]
-        stored = np.concatenate([*parts, np.empty(0, np.int64)])
-        sizes, counts = np.unique(stored, return_counts=True)
-        return np.concatenate((small, sizes)), np.concatenate((number[small], counts))
+        first = work.start[replica, counted:]
+        stretches = zip(first, first + number[counted:], strict=True)
+        parts = [work.pool[replica, a:b] for a, b in stretches if b > a]
+        return number[:counted], np.concatenate([*parts, np.zeros(0, np.int64)])
 
     def bytes_per_replica(self, particles: int) -> int:
         """See `Method.bytes_per_replica`."""

@@ -10,10 +10,11 @@ import numpy as np
 from ..core import rng
 from ..core.bounds import ROUNDING, note_bad, repair
 from ..core.compile import cold_piece, piece
-from ..core.loop import PATIENCE
+from ..core.loop import PATIENCE, Pieces
 from ..core.prefetch import prefetch
 from ..core.segment_tree import add, find, find_mixed
-from ..core.state import FIRST, FLOOR, PARTICLES, TRIALS, VALUE, VOLUME
+from ..core.state import FIRST, FLOOR, PARTICLES, SECOND, TRIALS, VALUE, VOLUME
+from ..core.store import Store, pieces_of
 from ..core.together import largest_rate, slots_with, takes
 from .low_rank_store import (
     APART,
@@ -23,17 +24,19 @@ from .low_rank_store import (
     STAGE,
     WIDEST,
     counted,
+    double,
     has_room,
     insert,
     make_room,
-    remove,
+    make_visit,
+    place_of,
     size_at,
+    slot_at,
     slot_for,
+    take,
+    view,
 )
-from .low_rank_trees import MOST, root_of
-
-#: a particle is a number of this many bits within its slot, and the slot above them
-_PLACE_BITS = 44
+from .low_rank_trees import MOST, prepare, root_of
 
 
 @piece
@@ -58,18 +61,18 @@ def _majorant(w, stage, a, b):
 @piece
 def _place(w, slot, x, weight):
     """Particle of a slot at which the cumulative weight passes `x`, every one having `weight`."""
-    place = min(np.int64(x / weight), np.int64(w.number[slot]) - 1)
+    k = min(np.int64(x / weight), np.int64(w.number[slot]) - 1)
     if slot >= counted(w):
-        prefetch(w.pool, w.start[slot] + place)
-    return place
+        prefetch(w.pool, w.start[slot] + k)
+    return place_of(slot, k)
 
 
 @piece
 def _choose(w, row, x):
-    """Slot and place of a particle, by one factor; `x` is uniform in [0, 1)."""
+    """Place of a particle, by one factor; `x` is uniform in [0, 1)."""
     root = root_of(w, row)
     slot, rest = find(w.tree, w.levels, row, min(np.int64(x * root), root - 1))
-    return slot, _place(w, slot, float(rest), w.grains[slot, row])
+    return _place(w, slot, float(rest), w.grains[slot, row])
 
 
 @cold_piece
@@ -79,7 +82,7 @@ def _choose_mixed(w, stage, x):
     weight = 0.0
     for row in range(w.rank[stage, 0]):
         weight += w.mix[row] * w.grains[slot, row]
-    return slot, _place(w, slot, rest, weight)
+    return _place(w, slot, rest, weight)
 
 
 @cold_piece
@@ -89,15 +92,15 @@ def _pair_mixed(s, w, stage, total):
     for k in range(w.rank[stage, 1]):
         left, right = w.term[stage, k, 0], w.term[stage, k, 1]
         w.mix[left] += w.weight[k] * root_of(w, right)
-    a, place = _choose_mixed(w, stage, rng.uniform(s.rng) * total)
-    w.chosen[0], w.chosen[1] = a, place
+    one = _choose_mixed(w, stage, rng.uniform(s.rng) * total)
+    a = slot_at(one)
     w.mix[:] = 0.0
     others = 0.0
     for k in range(w.rank[stage, 1]):
         left, right = w.term[stage, k, 0], w.term[stage, k, 1]
         w.mix[right] += w.weight[k] * w.grains[a, left]
         others += w.weight[k] * w.grains[a, left] * root_of(w, right)
-    w.chosen[2], w.chosen[3] = _choose_mixed(w, stage, rng.uniform(s.rng) * others)
+    return one, _choose_mixed(w, stage, rng.uniform(s.rng) * others)
 
 
 @piece
@@ -105,9 +108,8 @@ def _pair_by_term(s, w, stage, total):
     """Choose a term by its weight, then both particles by its two factors."""
     x = rng.uniform(s.rng)
     if w.rank[stage, 1] == 1:
-        w.chosen[0], w.chosen[1] = _choose(w, w.term[stage, 0, 0], x)
-        w.chosen[2], w.chosen[3] = _choose(w, w.term[stage, 0, 1], rng.uniform(s.rng))
-        return
+        one = _choose(w, w.term[stage, 0, 0], x)
+        return one, _choose(w, w.term[stage, 0, 1], rng.uniform(s.rng))
     x *= total
     k, weight = 0, 1.0
     for m in range(w.rank[stage, 1]):
@@ -118,17 +120,16 @@ def _pair_by_term(s, w, stage, total):
                 break
             x -= own
     # what is left of x is uniform below the weight of the term, and serves again
-    w.chosen[0], w.chosen[1] = _choose(w, w.term[stage, k, 0], x / weight)
-    w.chosen[2], w.chosen[3] = _choose(w, w.term[stage, k, 1], rng.uniform(s.rng))
+    one = _choose(w, w.term[stage, k, 0], x / weight)
+    return one, _choose(w, w.term[stage, k, 1], rng.uniform(s.rng))
 
 
 @piece
 def _choose_pair(s, w, stage, total):
     """Choose a pair by the majorant, which is `total` over all of them."""
     if w.rank[stage, 2] == 0:
-        _pair_by_term(s, w, stage, total)
-    else:
-        _pair_mixed(s, w, stage, total)
+        return _pair_by_term(s, w, stage, total)
+    return _pair_mixed(s, w, stage, total)
 
 
 @cold_piece
@@ -149,16 +150,12 @@ def _with_apart(w, stage):
 def _pair_with_apart(w, stage, x):
     """Choose the particle held apart, and another at `x` in the sum of `_with_apart`."""
     _with_apart(w, stage)
-    w.chosen[0], w.chosen[1] = w.meta[APART], 0
-    w.chosen[2], w.chosen[3] = _choose_mixed(w, stage, x)
+    return place_of(w.meta[APART], np.int64(0)), _choose_mixed(w, stage, x)
 
 
 @piece
 def pick(s, w, r, c):
-    """Place and size of a particle, see `smolux.core.loop.Pieces`.
-
-    A place is the number of the particle in its slot, with the slot above these bits.
-    """
+    """Place and size of a particle, see `smolux.core.loop.Pieces`."""
     first, last, low, high = slots_with(c, w.bits[0])
     total, largest = np.int64(0), largest_rate(s, r, low, high)
     for slot in range(first, min(last + 1, w.number.shape[0])):
@@ -168,36 +165,24 @@ def pick(s, w, r, c):
         while left >= w.number[slot]:
             left -= np.int64(w.number[slot])
             slot += 1
-        size = size_at(w, slot, left)
+        place = place_of(slot, left)
+        size = size_at(s, w, place)
         if low == high or takes(s, r, size, largest):
-            return (slot << _PLACE_BITS) | left, size
+            return place, size
         s.count[TRIALS] += 1
 
 
-@piece
-def seize(s, w, place):
-    """Put a particle in the place of the first of the pair."""
-    s.count[FIRST] = place >> _PLACE_BITS
-    w.chosen[0], w.chosen[1] = place >> _PLACE_BITS, place & ((1 << _PLACE_BITS) - 1)
-
-
-@piece
-def pair(s, w):
-    """Sizes of the chosen pair."""
-    return size_at(w, w.chosen[0], w.chosen[1]), size_at(w, w.chosen[2], w.chosen[3])
-
-
-def make_draw(rate: Any) -> Any:
+def _make_draw(rate: Any) -> Any:
     """Bind the drawing of the next pair."""
 
     @piece
-    def accepted(s, w, p, stage, raised):
-        """Whether the chosen pair collides: 1 or 0; -1 if its rate is none."""
+    def accepted(s, w, p, stage, raised, one, two):
+        """Whether a pair collides: 1 or 0; -1 if its rate is none."""
         x = rng.uniform(s.rng)
-        a, b = w.chosen[0], w.chosen[2]
+        a, b = slot_at(one), slot_at(two)
         if x * raised < w.share[a] * w.share[b]:
             return 1
-        i, j = pair(s, w)
+        i, j = size_at(s, w, one), size_at(s, w, two)
         value = rate(float(i), float(j), *p)
         majorant, units = raised * _majorant(w, stage, a, b), w.units[stage]
         if not 0.0 <= value * units <= majorant * ROUNDING:
@@ -208,13 +193,13 @@ def make_draw(rate: Any) -> Any:
         return 1 if x * majorant < value * units else 0
 
     @piece
-    def collides(s, w, p, stage, raised):
-        """Note the chosen pair if it collides, and whether: 1 or 0; -1 if its rate is none."""
-        if w.chosen[0] == w.chosen[2] and w.chosen[1] == w.chosen[3]:
+    def collides(s, w, p, stage, raised, one, two):
+        """Note a pair if it collides, and whether: 1 or 0; -1 if its rate is none."""
+        if one == two:
             return 0  # a particle does not meet itself
-        verdict = accepted(s, w, p, stage, raised)
+        verdict = accepted(s, w, p, stage, raised, one, two)
         if verdict > 0:
-            s.count[FIRST] = w.chosen[0]
+            s.count[FIRST], s.count[SECOND] = one, two
         return verdict
 
     @cold_piece
@@ -233,10 +218,10 @@ def make_draw(rate: Any) -> Any:
             s.count[TRIALS] += 1
             x = rng.uniform(s.rng) * total
             if x < apart:
-                _pair_with_apart(w, stage, x)
+                one, two = _pair_with_apart(w, stage, x)
             else:
-                _choose_pair(s, w, stage, others)
-            verdict = collides(s, w, p, stage, raised)
+                one, two = _choose_pair(s, w, stage, others)
+            verdict = collides(s, w, p, stage, raised, one, two)
             if verdict < 0:
                 return math.nan
             if verdict > 0:
@@ -266,8 +251,8 @@ def make_draw(rate: Any) -> Any:
             if limit < math.inf and wait * unit >= limit:
                 return limit
             s.count[TRIALS] += 1
-            _choose_pair(s, w, stage, total)
-            verdict = collides(s, w, p, stage, raised)
+            one, two = _choose_pair(s, w, stage, total)
+            verdict = collides(s, w, p, stage, raised, one, two)
             if verdict < 0:
                 return math.nan
             if verdict > 0:
@@ -298,32 +283,8 @@ def _account(w, stage, a, b, c, count):
 
 
 @piece
-def _take_out(s, w, gone):
-    """Take one of the pair out, or both; return their slots, 0 for one that stays."""
-    a, b = w.chosen[0], w.chosen[2]
-    if gone == 3:
-        if a == b and w.chosen[1] < w.chosen[3]:  # the later place first: the other one stays
-            remove(s, w, b, w.chosen[3])
-            remove(s, w, a, w.chosen[1])
-        else:
-            remove(s, w, a, w.chosen[1])
-            remove(s, w, b, w.chosen[3])
-        s.count[PARTICLES] -= 2
-        return a, b
-    if gone == 0:
-        return np.int64(0), np.int64(0)
-    slot, place = (a, w.chosen[1]) if gone == 1 else (b, w.chosen[3])
-    remove(s, w, slot, place)
-    s.count[PARTICLES] -= 1
-    return slot, np.int64(0)
-
-
-@piece
-def update(s, w, gone, entries, p):
-    """Take out what vanishes and put in what appears; False if there is no room."""
-    if entries == 0:  # what is gone is accounted for beside what appears
-        s.sizes[0], s.counts[0] = 1, 0
-        entries = 1
+def room(s, w, gone, entries, p):
+    """Whether there is room for what appears; if not, note how much there should be."""
     slots, together = w.number.shape[0], np.int64(0)
     for e in range(entries):
         if slot_for(w, s.sizes[e]) >= counted(w):
@@ -341,13 +302,22 @@ def update(s, w, gone, entries, p):
         if not has_room(w, slot_for(w, s.sizes[e]), together):
             w.meta[POOL_NEEDED] = 2 * w.pool.shape[0]
             return False
-    a, b = _take_out(s, w, gone)
-    stage = w.meta[STAGE]
-    for e in range(entries):
-        c = slot_for(w, s.sizes[e])
-        insert(s, w, c, s.sizes[e], s.counts[e])
-        if e > 0:
-            a = b = np.int64(0)  # no particle is in slot 0, and none weighs anything there
-        if w.meta[STAGE] >= 0:
-            _account(w, stage, a, b, c, s.counts[e])
     return True
+
+
+@piece
+def put(s, w, size, count, i, j, p):
+    """Put particles in, and account in all trees for them and for those that are gone."""
+    c = slot_for(w, size)
+    insert(s, w, c, size, count)
+    if w.meta[STAGE] >= 0:
+        # no particle is in slot 0, and none weighs anything there
+        a = slot_for(w, i) if i > 0 else np.int64(0)
+        b = slot_for(w, j) if j > 0 else np.int64(0)
+        _account(w, w.meta[STAGE], a, b, c, count)
+
+
+def bind(rate: Any, tally: Any) -> Pieces:
+    """Bind the pieces to a rate and a way to count."""
+    store = Store(view, size_at, pick, room, take, put, double, make_visit(tally))
+    return pieces_of(store, _make_draw(rate), prepare)

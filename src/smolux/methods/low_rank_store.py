@@ -28,6 +28,10 @@ SEEK = 6  # 1: candidates were in vain; a particle that outweighs all others is 
 APART = 7  # slot of that particle, 0 if there is none
 METAS = 8
 
+#: a place is the number of a particle within its slot, of this many bits, and the slot above them
+PLACE_BITS = 44
+_WITHIN = (1 << PLACE_BITS) - 1
+
 
 class Work(NamedTuple):
     """Particles and sums for C slots, F factors in K terms; tables for S stages.
@@ -45,8 +49,6 @@ class Work(NamedTuple):
         The stretch of each slot; the slots by where their stretches begin, as of the last move.
     pool : int32 or int64 array of shape (R, P)
         Sizes of the particles of the wider slots.
-    chosen : int64 array of shape (R, 4)
-        Slot and place of both partners of the pending event.
     meta : int64 array of shape (R, 8)
     mix : float64 array of shape (R, F)
         Scratch for majorants of mixed sign.
@@ -86,7 +88,6 @@ class Work(NamedTuple):
     room: np.ndarray
     order: np.ndarray
     pool: np.ndarray
-    chosen: np.ndarray
     meta: np.ndarray
     mix: np.ndarray
     grains: np.ndarray
@@ -115,7 +116,6 @@ def view(w, r):
         w.room[r],
         w.order[r],
         w.pool[r],
-        w.chosen[r],
         w.meta[r],
         w.mix[r],
         w.grains[r],
@@ -141,18 +141,32 @@ def counted(w):
 
 
 @piece
-def size_at(w, slot, place):
-    """Size of a particle."""
-    return slot if slot < counted(w) else np.int64(w.pool[w.start[slot] + place])
+def place_of(slot, k):
+    """Place of the particle `k` of a slot."""
+    return (slot << PLACE_BITS) | k
 
 
 @piece
-def remove(s, w, slot, place):
+def slot_at(place):
+    """Slot of a particle."""
+    return place >> PLACE_BITS
+
+
+@piece
+def size_at(s, w, place):
+    """Size of a particle."""
+    slot = slot_at(place)
+    return slot if slot < counted(w) else np.int64(w.pool[w.start[slot] + (place & _WITHIN)])
+
+
+@piece
+def take(s, w, place):
     """Take a particle out: the last of its slot moves into the gap."""
+    slot = slot_at(place)
     w.number[slot] -= 1.0
     if slot >= counted(w):
         first = w.start[slot]
-        w.pool[first + place] = w.pool[first + np.int64(w.number[slot])]
+        w.pool[first + (place & _WITHIN)] = w.pool[first + np.int64(w.number[slot])]
         s.count[STORED] -= 1
 
 
@@ -161,7 +175,6 @@ def insert(s, w, slot, size, count):
     """Put particles into a slot that has room for them."""
     n = np.int64(w.number[slot])
     w.number[slot] += count
-    s.count[PARTICLES] += count
     if size > s.count[LARGEST]:
         s.count[LARGEST] = size
     if slot >= counted(w):

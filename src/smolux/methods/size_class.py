@@ -158,18 +158,11 @@ class SizeClass(Method):
                 "or end earlier"
             )
 
-    def population(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
-        """See `Method.population`."""
+    def held(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
+        """See `Method.held`."""
         number, single = work.number[replica], int(work.meta[0, SINGLE])
-        small = np.flatnonzero(number[:single])
         lists = [_members(work, replica, g) for g in range(single, len(number)) if number[g]]
-        large, counts = np.unique(
-            np.concatenate(lists) if lists else np.zeros(0, np.int64), return_counts=True
-        )
-        return (
-            np.concatenate((small, large)).astype(np.int64),
-            np.concatenate((number[small], counts)).astype(np.int64),
-        )
+        return number[:single], np.concatenate([*lists, np.zeros(0, np.int64)])
 
     def split(self, work: Work, state: State, parts: int, copies: int, words: Words) -> list[Pile]:
         """See `Method.split`."""

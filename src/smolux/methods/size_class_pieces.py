@@ -13,7 +13,8 @@ from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
 from ..core.compile import at, cold_piece, piece
 from ..core.loop import PATIENCE, Pieces
 from ..core.prefetch import prefetch
-from ..core.state import FIRST, MAJORANT, PARTICLES, SECOND, SINCE, TRIALS, VOLUME
+from ..core.state import FIRST, MAJORANT, PARTICLES, SINCE, TRIALS, VOLUME
+from ..core.store import Store, pieces_of
 from ..core.together import largest_rate, slots_with, takes
 from ..core.wide import upper_half
 from .size_class_lists import place_in, place_of_particle, size_at, size_of_particle
@@ -23,8 +24,8 @@ from .size_class_table import prepare
 
 
 @piece
-def _pair(s, w):
-    return size_of_particle(w, s.count[FIRST]), size_of_particle(w, s.count[SECOND])
+def _size(s, w, place):
+    return size_of_particle(w, place)
 
 
 @piece
@@ -43,11 +44,6 @@ def _pick(s, w, r, c):
         if low == high or takes(s, r, size, largest):
             return one, size
         s.count[TRIALS] += 1
-
-
-@piece
-def _seize(s, w, place):
-    s.count[FIRST] = place
 
 
 @piece
@@ -192,22 +188,23 @@ def _remove(w, gone, a, place_a, b, place_b):
 
 
 @piece
-def _update(s, w, gone, entries, p):
+def _room(s, w, gone, entries, p):
     chunks = together = np.int64(0)
     for e in range(entries):
         together += listed(w, s.sizes[e], s.counts[e])
     for e in range(entries):
         chunks += chunks_for(w, s.sizes[e], s.counts[e], together)
-    if chunks > w.meta[FREE]:
-        return False
-    if gone > 0:
-        a, b = s.count[FIRST], s.count[SECOND]
-        _remove(w, gone, a, place_of_particle(w, a), b, place_of_particle(w, b))
-        s.count[PARTICLES] -= 2 if gone == 3 else 1
-    for e in range(entries):
-        insert(w, s.sizes[e], s.counts[e])
-        s.count[PARTICLES] += s.counts[e]
-    return True
+    return chunks <= w.meta[FREE]
+
+
+@piece
+def _take(s, w, place):
+    remove(w, place >> SLOT_BITS, place_of_particle(w, place))
+
+
+@piece
+def _put(s, w, size, count, i, j, p):
+    insert(w, size, count)
 
 
 @piece
@@ -239,15 +236,5 @@ def _release(s, held):
 def bind(rate: Any, tally: Any) -> Pieces:
     """Bind the pieces to a rate and a way to count."""
     find = _make_find(rate)
-    return Pieces(
-        view,
-        _make_draw(find),
-        _pair,
-        _update,
-        prepare,
-        double,
-        _pick,
-        _seize,
-        make_visit(tally),
-        Burst(_row, _hold, find, _replace, _release),
-    )
+    store = Store(view, _size, _pick, _room, _take, _put, double, make_visit(tally))
+    return pieces_of(store, _make_draw(find), prepare, Burst(_row, _hold, find, _replace, _release))
