@@ -1,4 +1,4 @@
-"""A kernel, a process and an initial condition that are not in the package meet the laws."""
+"""A kernel, a process, a start and a method that are not in the package meet the laws."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import runpy
 from pathlib import Path
 from typing import Any
 
+import laws
 import numpy as np
 import pytest
-from tests.shared import QUICK
+from tests.shared import QUICK, extinction
 
 import smolux as sx
 from smolux.kernels import Kernel
 
-OWN: Any = runpy.run_path(
-    str(Path(__file__).parents[2] / "examples/extending/plot_extending.py"), run_name="extension"
-)
+FOLDER = Path(__file__).parents[2] / "examples/extending"
+OWN: Any = runpy.run_path(str(FOLDER / "plot_extending.py"), run_name="extension")
+DIRECT: Any = runpy.run_path(str(FOLDER / "plot_method.py"), run_name="method")["Direct"]()
 MODEL = sx.Model(
     OWN["Turbulent"](0.1),
     [sx.processes.Aggregation(), OWN["Shedding"](0.3)],
@@ -53,6 +54,37 @@ def test_the_start_is_drawn_and_solved_alike() -> None:
     sizes, counts = initial.sample(600, 0.5)
     np.testing.assert_array_equal(sizes, np.arange(1, 7))
     np.testing.assert_array_equal(counts, 100)
+
+
+@extinction
+def test_a_method_of_ones_own() -> None:
+    laws.whole_distribution(DIRECT, "ballistic", 0.3)
+
+
+@extinction
+@pytest.mark.slow
+def test_a_method_of_ones_own_waits_as_others_do() -> None:
+    laws.waiting_times(DIRECT)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("subvolumes", [1, 2])
+def test_a_method_of_ones_own_with_other_processes(subvolumes: int) -> None:
+    """Against the rate equations, with particles that come, leave and shed others."""
+    processes = [
+        sx.processes.Aggregation(), OWN["Shedding"](0.3), sx.processes.Removal("0.1*k"),
+        sx.processes.Source(0.4, size=2),
+    ]  # fmt: skip
+    model = sx.Model(OWN["Turbulent"](0.1), processes, OWN["Uniform"](6, density=2.5))
+    replicas, time = 60, 0.5
+    ds = sx.simulate(
+        model, [time], method=DIRECT, particles=120, replicas=replicas, seed=5, sizes=12,
+        subvolumes=subvolumes, remix=0.1 if subvolumes > 1 else None,
+    )  # fmt: skip
+    exact = sx.solve(model, [time])
+    for order in (0, 1, 2):
+        expected = exact["moment"].sel(order=order).values[0]
+        laws.agree(ds["moment"].sel(order=order).values, expected, order)
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,8 @@ from .state import FIRST, PARTICLES, SECOND
 class Store(NamedTuple):
     """What a method says of its store; `s` is the state and `w` the work arrays of one replica.
 
+    How many particles there are, ``count[PARTICLES]``, is counted for all stores alike.
+
     Attributes
     ----------
     view : ``view(work, r)``
@@ -77,6 +79,18 @@ def _make_pair(size: Callable[..., Any]) -> Callable[..., Any]:
         return size(s, w, s.count[FIRST]), size(s, w, s.count[SECOND])
 
     return pair
+
+
+@lru_cache(maxsize=64)
+def _make_double(doubled: Callable[..., Any]) -> Callable[..., Any]:
+    @piece
+    def double(s, w):
+        if not doubled(s, w):
+            return False
+        s.count[PARTICLES] *= 2
+        return True
+
+    return double
 
 
 @lru_cache(maxsize=64)
@@ -141,7 +155,7 @@ def pieces_of(
         _make_pair(store.size),
         update,
         prepare,
-        store.double,
+        _make_double(store.double),
         store.pick,
         seize,
         store.visit,

@@ -309,7 +309,6 @@ def _double(s, w):
         w.sizes[stored + k] = w.sizes[k]
     s.count[STORED] *= 2
     s.count[MONOMERS] *= 2
-    s.count[PARTICLES] *= 2
     return True
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..core import rng
 from ..core.compile import cold_piece, piece
 from ..core.slots import slot_top
-from ..core.state import LARGEST, LONE_BITS, PARTICLES, SINCE, STORED
+from ..core.state import LARGEST, LONE_BITS, SINCE, STORED
 
 
 class Work(NamedTuple):
@@ -105,7 +105,6 @@ def double(s, w):
     for d in range(stored):
         w.large[stored + d] = w.large[d]
     s.count[STORED] *= 2
-    s.count[PARTICLES] *= 2
     s.count[SINCE] = 0
     return True
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core.compile import cold_piece, piece
 from ..core.slots import slot_of
-from ..core.state import LARGEST, PARTICLES, SINCE, STORED
+from ..core.state import LARGEST, SINCE, STORED
 
 # Entries of Work.meta.
 STAGE = 0  # row of the tables in force; -1: the tree is to be built
@@ -266,7 +266,6 @@ def double(s, w):
         w.number[slot] *= 2.0
     w.meta[STAGE] = -1
     s.count[STORED] *= 2
-    s.count[PARTICLES] *= 2
     return True
 
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..core.compile import at, cold_piece, piece
 from ..core.slots import slot_of
-from ..core.state import PARTICLES
 from .size_class_lists import append, cut, duplicate, is_list, place_of, size_at
 from .size_class_state import AHEAD, BITS, CHUNK, FREE, NEXT, SHARE, SINGLE, STALE, WIDEST
 
@@ -77,7 +76,6 @@ def double(s, w):
         else:
             duplicate(w, g)
         w.before[g] *= 2
-    s.count[PARTICLES] *= 2
     return True
 
 
