@@ -260,6 +260,8 @@ def test_a_size_at_the_limit_stays() -> None:
     laws.agree(ds["mass_out"].values[:, 0], 4.0 * gone)
     assert (ds["mass_out"].values[:, 1] == 4.0).all()
     assert (ds["particles"].values[:, 1] == 0).all()
+    assert (ds["events"].sel(process="aggregation").values[:, 1] == 3).all()
+    assert (ds["events"].sel(process="removal").values[:, 1] == 1).all()
 
 
 def test_sub_volumes_keep_the_balance() -> None:
