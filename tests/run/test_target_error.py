@@ -150,11 +150,11 @@ def test_progress_is_shown_toward_it() -> None:
 
 
 def test_stopped_again_and_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = simulate(particles=1000, target_error=0.04)
+    expected = simulate(particles=300)
     assert expected.sizes["replica"] > 8
     monkeypatch.setattr(replicas, "_SLICE", 1e-9)
     path = tmp_path / "run.npz"
-    ds = simulate(particles=1000, target_error=0.04, checkpoint=path, time_limit=1e-9)
+    ds = simulate(particles=300, checkpoint=path, time_limit=1e-9)
     seen = set()
     while not ds.attrs["complete"]:
         seen.add(ds.sizes["replica"])
