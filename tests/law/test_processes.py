@@ -234,6 +234,20 @@ def test_three_particles_that_leave() -> None:
     laws.agree(ds["mass_out"].values[:, 0], 3.0 - 3.0 / np.e)
 
 
+def test_what_two_of_different_size_become_leaves() -> None:
+    """Sizes 3 and 300 merge at K/V, and 303, counted with 300, leaves at 1.5; they do not."""
+    rate, times = 1.5, np.array([1.0, 4.0])
+    model = everything(
+        removal=lambda k: np.where(k == 303, rate, 0.0),
+        initial=sx.initial.from_sizes({3: 0.5, 300: 0.5}),
+    )
+    given = {"particles": 2, "replicas": 4000, "population": "fixed-volume"}
+    ds = simulated(model, times, 77, **given)
+    merge = 1.0 / 2.0
+    left = (rate * np.exp(-merge * times) - merge * np.exp(-rate * times)) / (rate - merge)
+    laws.agree(ds["mass_out"].values, 303.0 * (1.0 - left))
+
+
 def test_a_size_at_the_limit_stays() -> None:
     """Four monomers merge at 6/V, 3/V and 1/V; a three among them stays, and the four leaves."""
     ds = simulated(
@@ -246,6 +260,8 @@ def test_a_size_at_the_limit_stays() -> None:
     laws.agree(ds["mass_out"].values[:, 0], 4.0 * gone)
     assert (ds["mass_out"].values[:, 1] == 4.0).all()
     assert (ds["particles"].values[:, 1] == 0).all()
+    assert (ds["events"].sel(process="aggregation").values[:, 1] == 3).all()
+    assert (ds["events"].sel(process="removal").values[:, 1] == 1).all()
 
 
 def test_sub_volumes_keep_the_balance() -> None:

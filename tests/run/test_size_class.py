@@ -36,7 +36,7 @@ INITIAL = sx.initial.from_sizes({1: 0.5, 2: 0.3, 20: 0.2})
 
 @cache
 def solution(name: str) -> Any:
-    return sx.solve(model(KERNELS[name], 0.05, INITIAL), [0.1, 0.3])
+    return sx.solve(model(KERNELS[name], 0.05, INITIAL), [0.1, 0.3], tolerance=1e-6)
 
 
 #: the one that is furthest from low rank; the others say the same again

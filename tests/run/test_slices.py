@@ -36,7 +36,7 @@ LONE = [
 #: name, processes, density of monomers at the start, particles, end
 CASES = {
     "pairs": (PAIRS, 1.0, 300, 6.0),
-    "open": (OPEN, 0.012, 150, 5.0),
+    "open": (OPEN, 0.012, 150, 1.0),
     "open, fewer at the start": (OPEN, 0.3, 20, 9.0),
     "single": (LONE, 0.5, 40, 6.0),
 }

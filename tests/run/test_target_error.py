@@ -21,6 +21,7 @@ from smolux.errors import InputError, SmoluxWarning
 from smolux.goal import Goal, Trial, judge, plan_replicas
 from smolux.observables import recorded
 from smolux.observe import observable
+from smolux.plan import PILOT
 from smolux.planning import make_plan
 
 pytestmark = shared.stopped
@@ -71,6 +72,25 @@ def test_observables(target: str, name: str, where: Any) -> None:
     ds = simulate(target=target, target_error=0.04)
     assert half_width(ds, name, **where) <= 0.04
     assert ds.attrs["reached_error"] == pytest.approx(half_width(ds, name, **where), rel=1e-9)
+
+
+def test_replicas_begin_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where those that were planned are too few, and further ones are asked for."""
+    begun: list[int] = []
+    planned = set()
+    start = driving.start
+
+    def noted(plan: Any, first: int, count: int) -> Any:
+        if first < PILOT:
+            planned.add(plan.replicas)
+            begun.extend(range(first, first + count))
+            assert len(begun) == len(set(begun))
+        return start(plan, first, count)
+
+    monkeypatch.setattr(driving, "start", noted)
+    ds = simulate(target="M2", target_error=0.04)
+    assert begun == list(range(ds.sizes["replica"]))
+    assert len(planned) > 1
 
 
 def test_the_largest_cluster() -> None:
@@ -130,11 +150,11 @@ def test_progress_is_shown_toward_it() -> None:
 
 
 def test_stopped_again_and_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = simulate(particles=1000, target_error=0.04)
+    expected = simulate(particles=300)
     assert expected.sizes["replica"] > 8
     monkeypatch.setattr(replicas, "_SLICE", 1e-9)
     path = tmp_path / "run.npz"
-    ds = simulate(particles=1000, target_error=0.04, checkpoint=path, time_limit=1e-9)
+    ds = simulate(particles=300, checkpoint=path, time_limit=1e-9)
     seen = set()
     while not ds.attrs["complete"]:
         seen.add(ds.sizes["replica"])

@@ -17,7 +17,7 @@ SUITE = Suite(
         "The same tests pass on an unchanged copy. If they pass on the changed one, too, the "
         "mistake is not seen. A test that does not end, and an interpreter that crashes, are seen.",
         "With `SMOLUX_CACHE_DIR` set, what was tried is kept there: with the same code, the same "
-        "tests and the same mistake it is not tried again.",
+        "tests and the same mistake it is not tried again, and the processor time is without it.",
         "The mistakes are in `verification/mutation/mistakes`. A new one is an entry there.",
     ),
 )
