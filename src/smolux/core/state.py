@@ -52,7 +52,7 @@ COUNTS = len(_count)
 TIME = _clock("time", Rule.WHOLE)  # of the latest event
 PENDING = _clock("pending", Rule.APART)  # time of the next event
 VOLUME = _clock("volume", Rule.WHOLE, extensive=True)
-EXTINCT = _clock("extinct", Rule.WHOLE)  # when one particle was left; NaN before
+EXTINCT = _clock("extinct", Rule.WHOLE)  # since when one particle is left, or none; else NaN
 MAJORANT = _clock("majorant", Rule.APART)  # bound of the rate over the sizes present
 FLOOR = _clock("floor", Rule.MAXIMUM)  # least majorant, raised by repairs
 VALUE = _clock("value", Rule.APART)  # the value that broke a bound
