@@ -27,6 +27,7 @@ from smolux.model import Model
 from smolux.observe import observable
 from smolux.plan import Plan
 from smolux.planning import checked, decided
+from smolux.progress import Progress
 from smolux.replicas import Group, empty_state, initial_populations
 from smolux.totals import Totals, attempts_of
 from smolux.weighting.base import Weighting
@@ -221,7 +222,7 @@ def interleaved(
     samplers: Sequence[Sampler],
     replicas: int,
     workers: int,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> Iterator[tuple[Batch, ...]]:
     """Run the replicas of several samplers in turns; yield the batches of a turn, one of each.
 
@@ -235,14 +236,25 @@ def _in_order(
     samplers: Sequence[Sampler],
     replicas: int,
     workers: int,
-    progress: Callable[[float], None] | None,
+    progress: Callable[[Progress], None] | None,
 ) -> Iterator[Batch]:
     tasks = (
         (sampler.batch, first, min(sampler.plan.replicas, replicas - first))
         for first, sampler in _turns(samplers, replicas)
     )
     halt, waiting = Event(), deque[tuple[int, Future[Batch]]]()
-    done, total = 0, replicas * len(samplers)
+    done, total, started = 0, replicas * len(samplers), time.perf_counter()
+
+    def tell() -> None:
+        if progress is not None:
+            seconds, share = time.perf_counter() - started, done / total
+            progress(
+                Progress(
+                    share, "sampling", done, "replicas", done / seconds if seconds > 0 else 0.0,
+                    seconds * (1.0 / share - 1.0), counts={"replicas": done},
+                )
+            )  # fmt: skip
+
     with ThreadPoolExecutor(workers) as pool:
         try:
             for run, first, count in tasks:
@@ -251,10 +263,11 @@ def _in_order(
                     continue
                 done += waiting[0][0]
                 yield waiting.popleft()[1].result()
-                if progress is not None:
-                    progress(done / total)
+                tell()
             while waiting:
+                done += waiting[0][0]
                 yield waiting.popleft()[1].result()
+                tell()
         finally:
             halt.set()
             for _, future in waiting:

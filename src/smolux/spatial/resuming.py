@@ -11,9 +11,10 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..progress import Progress
 from ..results import told
 from .result import system_of, trace_of
-from .running import Limits, SpatialProgress, checked, driven
+from .running import Limits, checked, driven
 from .windowed import Windowed
 
 
@@ -25,7 +26,7 @@ def resume(
     times: ArrayLike | None = None,
     max_events: int | None = None,
     time_limit: float | None = None,
-    progress: Callable[[SpatialProgress], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> xr.DataTree:
     """Let a run go on from where it stopped, by the windowed method.
 

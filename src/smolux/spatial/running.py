@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import is_number, numbers
 from ..errors import InputError, Interrupted, OutOfMemoryError, did_you_mean
+from ..progress import Progress
 from ..room import needed
-from .ctrlc import CtrlC
+from ..stopping import AtOnce, Stopper
 from .method import Run, SpatialMethod
 from .methods import METHODS
 from .playing import narrate
@@ -34,42 +35,8 @@ _TICK = 0.2
 _EVENT = 100
 
 
-@dataclass(frozen=True)
-class SpatialProgress:
-    """How far a run is.
-
-    Attributes
-    ----------
-    events : int
-        Merges and reflections so far, or steps.
-    clusters : int
-        Left.
-    time : float
-        Simulated so far.
-    fraction : float
-        Share of the merges that are wanted which is done, 0 to 1.
-    events_per_second : float
-    seconds_left : float
-        Not known: NaN.
-    compile_seconds : float
-        Until the first slice was done.
-    bounds_seconds : float
-        Always zero: nothing is bounded.
-    """
-
-    events: int
-    clusters: int
-    time: float
-    fraction: float
-    events_per_second: float
-    seconds_left: float
-    compile_seconds: float
-    bounds_seconds: float = 0.0
-
-    @property
-    def note(self) -> str:
-        """For a bar: the clusters left."""
-        return f"{self.clusters} clusters left"
+#: former name of `Progress`
+SpatialProgress = Progress
 
 
 def simulate(
@@ -81,7 +48,7 @@ def simulate(
     times: ArrayLike | None = None,
     max_events: int | None = None,
     time_limit: float | None = None,
-    progress: Callable[[SpatialProgress], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> xr.DataTree:
     """Let discs fly and stick until few clusters are left.
 
@@ -103,7 +70,7 @@ def simulate(
     time_limit : float, optional
         Stop after so many seconds of wall time.
     progress : callable, optional
-        Called with a `SpatialProgress` a few times a second.
+        Called with a `Progress` a few times a second.
 
     Returns
     -------
@@ -169,13 +136,13 @@ def driven(
     """Drive a run to its end and make the result of it."""
     started = clock.perf_counter()
     run = begun()
-    with CtrlC() as keys:
-        driver = _Driver(run, len(system), limits.clusters, started, progress, keys)
+    with Stopper() as stopper:
+        driver = _Driver(run, len(system), limits.clusters, started, progress, stopper.check)
         try:
             stopped = driver.drive(*limits.numbers())
+        except AtOnce:  # state and log may not agree
+            raise
         except KeyboardInterrupt:
-            if keys.impatient:
-                raise
             driver.interrupted = True
             stopped = "interrupted"
     trace = run.trace()
@@ -191,10 +158,11 @@ class _Driver:
     """Calls a run slice by slice."""
 
     def __init__(
-        self, run: Run, discs: int, target: int, started: float, progress: Any, keys: CtrlC
-    ) -> None:
+        self, run: Run, discs: int, target: int, started: float, progress: Any,
+        check: Callable[[], None],
+    ) -> None:  # fmt: skip
         self.run, self.discs, self.target = run, discs, target
-        self.started, self.progress, self.keys = started, progress, keys
+        self.started, self.progress, self.check = started, progress, check
         self.compile_seconds = 0.0
         self.interrupted = False
 
@@ -202,7 +170,7 @@ class _Driver:
         """Go on to the end; return why it was not the goal, or nothing."""
         told = self.started
         while (code := self._slice(until, most, limit)) is None:
-            self.keys.check()
+            self.check()
             now = clock.perf_counter()
             if now - told > _TICK:
                 told = now
@@ -239,10 +207,16 @@ class _Driver:
         speed = run.events / (clock.perf_counter() - self.started)
         done = min((self.discs - run.clusters) / wanted, 1.0)
         self.progress(
-            SpatialProgress(
-                run.events, run.clusters, run.time, done, speed, np.nan, self.compile_seconds
+            Progress(
+                done,
+                "simulating",
+                run.events,
+                events_per_second=speed,
+                compile_seconds=self.compile_seconds,
+                note=f"{run.clusters} clusters left",
+                counts={"clusters": run.clusters, "time": run.time},
             )
-        )  # fmt: skip
+        )
 
 
 def checked(
@@ -262,7 +236,7 @@ def checked(
     if not (_number(clusters) and clusters == int(clusters) and clusters >= 1):
         problems.append(f"clusters = {clusters!r}: must be a whole number, one or more")
     if progress is not None and not callable(progress):
-        problems.append(f"progress = {progress!r}: must be a function of a SpatialProgress")
+        problems.append(f"progress = {progress!r}: must be a function of a Progress")
     output = _times(times, chosen, problems)
     if problems:
         raise InputError(problems)
