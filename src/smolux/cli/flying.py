@@ -195,7 +195,8 @@ def described(case: cases.SpatialCase, source: str) -> str:
         If they do not, or for what a run would refuse.
     """
     system = case.with_seed().run.system()
-    checked(system, progress=None, **case.run.arguments())
+    given = case.run.arguments()
+    checked(system, given.pop("method"), given)
     run_ = case.run
     memory = 450 * len(system)
     lines = [

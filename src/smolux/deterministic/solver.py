@@ -17,7 +17,7 @@ from ..processes import Source
 from ..progress import Progress
 from ..results import to_dataset, told
 from ..settings import SolverSettings
-from .arguments import checked, renamed
+from .arguments import renamed
 from .encounters import Encounters
 from .equations import Equations
 from .gel import may_gel
@@ -142,7 +142,7 @@ def solve(
         "max_window": max_window, "orders": orders, "sizes": sizes,
         "bins_per_octave": bins_per_octave, "gel": gel, "check": check,
     }  # fmt: skip
-    settings = checked(model, given)
+    settings = SolverSettings.for_model(model, given)
     model = frozen(model)
     dataset = Run(model, settings, progress).dataset()
     if check:
