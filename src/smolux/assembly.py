@@ -16,7 +16,7 @@ from .core.loop import make_advance, make_loop, make_next_event
 from .core.record import tally_one
 from .core.slots import slot_edges
 from .core.splits import fill, new_splits, slots_beside
-from .core.state import LONE_BITS, Parameters
+from .core.state import BOTH, LONE_BITS, Parameters
 from .core.weights import (
     make_outcome,
     make_rate,
@@ -95,7 +95,7 @@ def _outcomes(kinds: tuple[Any, ...]) -> Any:
 
     @piece
     def outcome(r, i, j, s, p, q):
-        return found(r, i, j, s, q.outcomes), 3
+        return found(r, i, j, s, q.outcomes), BOTH
 
     return outcome
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Any
 
 from .compile import piece
-from .state import DOUBLE_AT, DOUBLINGS, EXTENSIVE, EXTINCT, GROW, PARTICLES, TIME
+from .state import COUNTED, DOUBLE_AT, DOUBLINGS, EXTENSIVE, EXTINCT, GROW, PARTICLES, TIME
 
 
 @lru_cache(maxsize=64)
@@ -39,7 +39,7 @@ def make_after_event(double: Callable[..., Any]) -> Callable[..., Any]:
                 s.clock[column] *= 2.0
             s.count[DOUBLINGS] += 1
             if s.held.shape[0] > 0:
-                s.held[0] = 0
+                s.held[COUNTED] = 0
         if s.count[PARTICLES] > 1:
             s.clock[EXTINCT] = math.nan
         elif math.isnan(s.clock[EXTINCT]):

@@ -40,6 +40,8 @@ from .state import (
     LONE_PROCESS,
     LONE_SIZE,
     MASS_OUT,
+    ONE,
+    OTHER,
     PENDING,
     SPLIT_IN_DOUBT,
     TIME,
@@ -221,7 +223,7 @@ def make_kinds(
             entries, removes = lone_outcome(r - pairs, size, s.count[LONE_PART], s)
             entries = rounded(s, entries, size, p)
             left = float(size) * stands(size, p) if removes else 0.0
-            return entries, size, np.int64(0), 1, 0.0, left
+            return entries, size, np.int64(0), ONE, 0.0, left
         size = pick(s, windows, r)
         s.sizes[0], s.counts[0] = size, 1
         return 1, np.int64(0), np.int64(0), 0, float(size) * stands(size, p), 0.0
@@ -266,9 +268,9 @@ def make_books(stands: Any, ledger: Any, known: Any, lones: int) -> Books:
 
     @piece
     def book(s, gone, i, j, entries, q):
-        if gone & 1:
+        if gone & ONE:
             leave(s, i)
-        if gone & 2:
+        if gone & OTHER:
             leave(s, j)
         for e in range(entries):
             enter(s, s.sizes[e], s.counts[e], q)

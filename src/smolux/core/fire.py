@@ -18,7 +18,6 @@ from . import rng
 from .bounds import ROUNDING, note_bad, thinned
 from .compile import piece
 from .state import (
-    BAD_FACTOR,
     BAD_SHARE,
     BY_KERNEL,
     CLOCKS,
@@ -50,7 +49,7 @@ class Kinds(NamedTuple):
     alive : ``alive(s)``
         Whether anything happens when it comes.
     choose : ``choose(s, w, windows, q)``
-        The process that takes place, -1 for none, less for a factor or a share that is none.
+        The process that takes place, -1 for none, or with a minus the reason to return.
     result : ``result(s, w, windows, r, p, q)``
         Write what process `r` makes into ``s.sizes`` and ``s.counts``. Returns how many entries,
         the sizes of what is there and may vanish, which of both does (bits 1 and 2), and the mass
@@ -104,7 +103,7 @@ def make_choose_process(
 
         @piece
         def choose_and_share(s, w, windows, q):
-            """Choose the process, or none, also by the sizes; -4 if the share of them is none."""
+            """Choose the process, or none, also by the share of these sizes."""
             r = choose(s, w, windows, q)
             if r < 0:
                 return r
@@ -113,7 +112,7 @@ def make_choose_process(
             if not 0.0 <= value <= ROUNDING:
                 note_bad(s, i, j, value)
                 s.count[PROCESS] = r
-                return -4
+                return -BAD_SHARE
             return r if rng.uniform(s.rng) < value else -1
 
         return choose_and_share
@@ -256,8 +255,8 @@ def make_fire(
             r = s.count[PROCESS]
             if r < 0:
                 r = choose(s, w, windows, q)
-                if r <= -2:
-                    return BAD_SHARE if r == -4 else BAD_FACTOR
+                if r < -1:
+                    return -r
                 s.count[PROCESS] = r
             if r >= 0:
                 reason = exchange(s, w, windows, r, p, q)
