@@ -81,7 +81,7 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
             total += s.clock[CLOCKS + r]
         return draw(s, w, p, total, limit) if pairs > 0 and total > 0.0 else math.inf
 
-    @cold_piece
+    @piece
     def other(s, w, windows, q, limit):
         """Draw what else comes first, return its waiting time; the limit if nothing does."""
         wait = limit
