@@ -26,6 +26,7 @@ _LAZY = {
     "WorkerError": "smolux.errors",
     "Interrupted": "smolux.errors",
     "SmoluxWarning": "smolux.errors",
+    "Progress": "smolux.progress",
     **dict.fromkeys(
         (
             "analysis",
@@ -52,6 +53,7 @@ __all__ = [
     "InputError",
     "Interrupted",
     "Model",
+    "Progress",
     "SmoluxWarning",
     "WorkerError",
     "__version__",
@@ -105,6 +107,7 @@ if TYPE_CHECKING:
     from .errors import InputError, Interrupted, SmoluxWarning, WorkerError
     from .laws import law
     from .model import Model
+    from .progress import Progress
     from .stochastic import resume, simulate
     from .sweeps import sweep
 

@@ -10,12 +10,13 @@ from .content import digest, frozen, is_frozen
 from .core import beside, rng
 from .core.burst import make_burst
 from .core.compile import piece, user_piece, why_not
+from .core.fire import make_encounters, make_fire
 from .core.lone import Lone, bind_outcomes, bind_rates, make_ledger, make_lone
-from .core.loop import make_fire, make_loop, make_next_event
+from .core.loop import make_advance, make_loop, make_next_event
 from .core.record import tally_one
 from .core.slots import slot_edges
 from .core.splits import fill, new_splits, slots_beside
-from .core.state import LONE_BITS, Parameters
+from .core.state import BOTH, LONE_BITS, Parameters
 from .core.weights import (
     make_outcome,
     make_rate,
@@ -94,7 +95,7 @@ def _outcomes(kinds: tuple[Any, ...]) -> Any:
 
     @piece
     def outcome(r, i, j, s, p, q):
-        return found(r, i, j, s, q.outcomes), 3
+        return found(r, i, j, s, q.outcomes), BOTH
 
     return outcome
 
@@ -231,24 +232,28 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
     pieces = method.bind(simulated, tally)
     random = weight is not None or any(type(p).random for p in pairs)
     share = _shares(tuple(law.rate for law in _share_laws(pairs)))
+    encounters = make_encounters(pieces.pair, outcome, factor, len(pairs), share)
     if not lone and not sources:
-        fire = make_fire(pieces.pair, pieces.update, outcome, factor, random, len(pairs), share)
+        fire = make_fire(encounters, pieces.update, random)
         burst = None
         if pieces.burst is not None and share is None:
             burst = make_burst(pieces.burst, outcome, len(pairs), random)
-        return make_loop(pieces, make_next_event(pieces.draw, burst), fire)
+        next_event = make_next_event(pieces.draw, burst)
+        return make_loop(make_advance(pieces, next_event, fire), pieces.view)
     about = [Lone(p.law, type(p).outcome, p.least, p.splits, p.opens) for p in lone]
     shape = len(pairs), len(lone), len(sources)
     rates = bind_rates(about)
     ledger = make_ledger(rates, lambda tally: method.bind(simulated, tally).visit, shape[1])
     draw_lone = make_lone(pieces.pick, rates, shape[0], shape[1])
     choose = beside.make_choice(_factors(_rates(lone)), _factors(_rates(sources)), *shape)
-    fire = beside.make_fire(
-        pieces, outcome, factor, bind_outcomes(about), choose, make_stands(weight),
-        make_replacement(weight), ledger, rates.known, shape[0], shape[1], share,
-    )  # fmt: skip
+    stands = make_stands(weight)
+    kinds = beside.make_kinds(
+        encounters, bind_outcomes(about), choose, stands, make_replacement(weight), *shape[:2]
+    )
+    books = beside.make_books(stands, ledger, rates.known, shape[1])
+    fire = make_fire(kinds, pieces.update, True, books)
     next_event = beside.make_next_event(pieces.draw, ledger.ready, draw_lone, pieces.seize, *shape)
-    return make_loop(pieces, next_event, fire)
+    return make_loop(make_advance(pieces, next_event, fire), pieces.view)
 
 
 def rates_for(model: Model, weighting: Weighting) -> Rates:

@@ -116,12 +116,22 @@ class Run:
         fraction = min(done / expected, 1.0)
         spent = time.perf_counter() - self.started - self.compile_seconds
         left = spent * (1 - fraction) / fraction if fraction > 0 else np.nan
+        reached = np.nan if self.verdict is None else self.verdict.error
+        wanted = np.nan if goal is None else goal.error
+        near = f"±{100 * reached:.2g} % of ±{100 * wanted:.2g} %, {self.plan.replicas} replicas"
         self.progress(
             Progress(
-                events, fraction, rate, left, self.compile_seconds, self.plan.replicas,
-                np.nan if self.verdict is None else self.verdict.error,
-                np.nan if goal is None else goal.error,
-                self.planned + sum(g.bounds_seconds for g in self.groups),
+                fraction,
+                "simulating",
+                events,
+                events_per_second=rate,
+                seconds_left=left,
+                compile_seconds=self.compile_seconds,
+                bounds_seconds=self.planned + sum(g.bounds_seconds for g in self.groups),
+                note=near if np.isfinite([reached, wanted]).all() else "",
+                counts={
+                    "replicas": self.plan.replicas, "error": reached, "target_error": wanted,
+                },
             )
         )  # fmt: skip
 

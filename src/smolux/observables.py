@@ -149,8 +149,8 @@ OBSERVABLES: tuple[Observable, ...] = (
     ),
     Observable(
         "extinction_time", _END, "time at which all particles had become one cluster",
-        "when everything had become one cluster; NaN if it had not, and in models of more than "
-        "encounters", TIME, clock=EXTINCT,
+        "since when a replica has been one cluster, or none where particles leave; NaN if there "
+        "are more, be it again", TIME, clock=EXTINCT,
     ),
     Observable(
         "mass", _TIMES, "mass in the simulated volume, in monomers",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +9,6 @@ import numpy as np
 
 from .content import frozen
 from .costing import chosen_method
-from .errors import InputError, Problem
 from .methods import SizeClass
 from .model import Model
 from .pilot import chosen_weighting
@@ -27,27 +25,7 @@ def make_plan(model: Any, times: Any, **given: Any) -> Plan:
     InputError
         With every mistake, or if there is not enough memory.
     """
-    return decided(frozen(model), checked(model, {"times": times, **given}))
-
-
-def checked(model: Any, given: Mapping[str, Any]) -> Settings:
-    """Check the arguments of `simulate`, all at once.
-
-    Raises
-    ------
-    InputError
-        With every mistake.
-    """
-    problems: list[str] = []
-    if not isinstance(model, Model):
-        problems.append(Problem("model", "must be a smolux.Model(kernel=..., ...)", model))
-    try:
-        settings = Settings.checked(given)
-    except InputError as error:
-        raise InputError([*problems, *error.problems]) from None
-    if problems:
-        raise InputError(problems)
-    return settings
+    return decided(frozen(model), Settings.for_model(model, {"times": times, **given}))
 
 
 def decided(model: Model, settings: Settings) -> Plan:

@@ -7,23 +7,22 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
 from . import checkpoint as checkpoints
 from .content import frozen
 from .driving import Elsewhere, Threads
-from .errors import InputError
 from .executors import adapted, workers_of
 from .methods.base import Method
 from .model import Model
-from .planning import checked, decided
+from .planning import decided
 from .progress import Progress
 from .remembered import spent
 from .resources import cores
 from .results import told
-from .settings import Control
+from .settings import Control, Settings
 from .subvolumes import start
 from .weighting.base import Weighting
 
@@ -163,13 +162,9 @@ def simulate(
     """
     given = dict(locals())
     before = spent()
-    control, problems = _controlled(given)
-    try:
-        settings = checked(given.pop("model"), given)
-    except InputError as error:
-        raise InputError([*error.problems, *problems]) from None
-    if problems:
-        raise InputError(problems)
+    given["executor"] = adapted(executor)
+    settings = Settings.for_model(given.pop("model"), given, Control.mistakes(given))
+    control = Control.checked(given)
     plan = decided(frozen(model), settings)
     planned = spent() - before
     other = control.executor
@@ -210,15 +205,8 @@ def resume(
         As `simulate`, and if the file cannot be read.
     """
     given = dict(locals())
-    control, problems = _controlled(given | {"checkpoint": None})
-    if problems:
-        raise InputError(problems)
+    control = Control.checked(given | {"executor": adapted(executor), "checkpoint": None})
     file = Path(checkpoint).expanduser()
     control, (plan, groups) = replace(control, checkpoint=file), checkpoints.load(file, model)
     workers = max(1, cores() // plan.subvolumes)
     return told(Threads(plan, groups, control, workers, resumed=True).finish())
-
-
-def _controlled(given: dict[str, Any]) -> tuple[Control, list[str]]:
-    """Return those of the arguments that drive a run, and what is wrong with them."""
-    return Control.checked(given | {"executor": adapted(given["executor"])})

@@ -184,6 +184,8 @@ class Divided:
             work = method.collect(rates, [given[k] for given in piles], state, plan.mass)
             hand_on(self.state, state)
             state.clock[0, (TIME, VOLUME, EXCESS)] = start, clock[VOLUME] / used, clock[EXCESS]
+            if used == 1:
+                state.clock[0, EXTINCT] = clock[EXTINCT]
             state.count[0, WINDOW] = window
             method.use(work, state, learnt)
             known = parameters[k] if k < len(parameters) else None
@@ -234,8 +236,8 @@ class Divided:
         self.seconds += sum(part.seconds for part in self.parts)
         self.bounds_seconds += sum(part.bounds_seconds for part in self.parts)
         clock[EXCESS] = clock[CLOCKS:].sum()
-        if count[PARTICLES] == 1 and np.isnan(clock[EXTINCT]):
-            clock[EXTINCT] = self.parts[0].state.clock[0, EXTINCT]
+        few = count[PARTICLES] <= 1
+        clock[EXTINCT] = max(s.clock[0, EXTINCT] for s in states) if few else np.nan
         elapsed, clock[TIME] = end - clock[TIME], end
         self.stretch += 1
         self.length = 2.0 * elapsed

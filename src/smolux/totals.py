@@ -70,7 +70,7 @@ class Totals:
     worst : tuple
         The highest bound that the kernel was found to need, and the sizes there.
     extinct, first : int, float
-        Replicas that ended as one cluster, and when the first did; infinite if none.
+        Replicas that ended as one cluster at most, and when the first did; infinite if none.
     """
 
     replicas: int
@@ -123,8 +123,9 @@ class Totals:
         found = [*plan.model.initial.remarks, *self._broken_bounds(plan)]
         found += self._rarely_accepted(plan)
         if self.extinct:
+            left = "one cluster or none" if plan.model.open else "one cluster"
             found.append(
-                f"{self.extinct} of {self.replicas} replicas ended as one cluster (extinction), "
+                f"{self.extinct} of {self.replicas} replicas ended as {left} (extinction), "
                 f"the first at t = {self.first:.6g}: more particles, or population='doubling', "
                 "put this off"
             )

@@ -73,7 +73,7 @@ def test_a_method_of_ones_own_with_other_processes(subvolumes: int) -> None:
     """Against the rate equations, with particles that come, leave and shed others."""
     processes = [
         sx.processes.Aggregation(), OWN["Shedding"](0.3), sx.processes.Removal("0.1*k"),
-        sx.processes.Source(0.4, size=2),
+        sx.processes.Source({2: 0.4}),
     ]  # fmt: skip
     model = sx.Model(OWN["Turbulent"](0.1), processes, OWN["Uniform"](6, density=2.5))
     replicas, time = 60, 0.5

@@ -19,7 +19,7 @@ import pytest
 from scipy import integrate, linalg, stats
 
 import smolux as sx
-from shared import FORMULA, laborious
+from shared import FORMULA, extinction, laborious
 from smolux import case as cases
 from smolux.deterministic import steady_state
 from smolux.errors import InputError
@@ -225,15 +225,24 @@ def test_rates_within_a_slot(rates: tuple[float, float]) -> None:
         laws.agree(ds["n"].sel(size=size).values[:, 0], density * np.exp(-0.3 * rate), size)
 
 
+@extinction
 def test_three_particles_that_leave() -> None:
-    """Each by itself: 3/e are left at t = 1, whatever the counts of the last ones are."""
+    """Each by itself: 3/e are left at t = 1, whatever the counts of the last ones are.
+
+    The extinction is when the second has left, and stays that when the last one has, too.
+    """
     alone = sx.kernels.formula(FORMULA, c0=0.0, c1=0.0, c2=0.0, c3=0.0)
     model = replace(everything(removal=1.0), kernel=alone)
     ds = simulated(model, [1.0], 73, particles=3, replicas=4000, population="fixed-volume")
     laws.agree(ds["particles"].values[:, 0], 3.0 / np.e)
     laws.agree(ds["mass_out"].values[:, 0], 3.0 - 3.0 / np.e)
+    since = ds["extinction_time"].values
+    np.testing.assert_array_equal(np.isfinite(since), ds["particles"][:, 0] <= 1)
+    found = stats.kstest(since[np.isfinite(since)], lambda t: _second_left(t) / _second_left(1.0))
+    assert found.pvalue > laws.RARE
 
 
+@extinction
 def test_what_two_of_different_size_become_leaves() -> None:
     """Sizes 3 and 300 merge at K/V, and 303, counted with 300, leaves at 1.5; they do not."""
     rate, times = 1.5, np.array([1.0, 4.0])
@@ -248,6 +257,38 @@ def test_what_two_of_different_size_become_leaves() -> None:
     laws.agree(ds["mass_out"].values, 303.0 * (1.0 - left))
 
 
+def _second_left(t: Any) -> Any:
+    """Probability that of three particles two at least have left, each at the rate 1."""
+    left = np.exp(-t)
+    return (1.0 - left) ** 2 * (1.0 + 2.0 * left)
+
+
+@extinction
+def test_since_when_one_cluster_is_left() -> None:
+    """Two monomers merge at 1/V = 1/2 and the cluster breaks at c: the last time of many counts.
+
+    At the time T there is one cluster since t or before with the probability
+    ``(exp(c t) - exp(-t/2)) exp(-c T) / (1 + 2 c)``.
+    """
+    c, end = 0.25, 20.0
+    ds = simulated(
+        everything(fragmentation=2.0 * c), [end], 77, particles=2, replicas=4000,
+        population="fixed-volume",
+    )  # fmt: skip
+    assert ds["collisions"].mean() > 2.0
+
+    def one(t: Any) -> Any:
+        return (np.exp(c * t) - np.exp(-0.5 * t)) * np.exp(-c * end) / (1.0 + 2.0 * c)
+
+    since = ds["extinction_time"].values
+    finite = np.isfinite(since)
+    np.testing.assert_array_equal(finite, ds["particles"][:, 0] == 1)
+    laws.agree(finite.astype(float), one(end))
+    found = stats.kstest(since[finite], lambda t: one(t) / one(end))
+    assert found.pvalue > laws.RARE
+
+
+@extinction
 def test_a_size_at_the_limit_stays() -> None:
     """Four monomers merge at 6/V, 3/V and 1/V; a three among them stays, and the four leaves."""
     ds = simulated(
@@ -275,6 +316,24 @@ def test_sub_volumes_keep_the_balance() -> None:
     agree(ds, truth, case)
 
 
+@extinction
+@every_method
+def test_sub_volumes_end(method: str) -> None:
+    """Of 2000 particles each leaves at the rate 1; one is left since the second to last has."""
+    alone = sx.kernels.formula(FORMULA, c0=0.0, c1=0.0, c2=0.0, c3=0.0)
+    ds = simulated(
+        replace(everything(removal=1.0), kernel=alone), [30.0], 78, particles=2000, replicas=30,
+        subvolumes=2, population="fixed-volume", method=method,
+    )  # fmt: skip
+    assert (ds["particles"] == 0).all()
+
+    def one_left(t: Any) -> Any:
+        gone = 1.0 - np.exp(-t)
+        return gone**1999 * (gone + 2000.0 * np.exp(-t))
+
+    assert stats.kstest(ds["extinction_time"], one_left).pvalue > laws.RARE
+
+
 def test_trajectories_do_not_depend_on_the_output_times() -> None:
     model = everything(**CASES["all"])
     few, many = (simulated(model, times, 42, replicas=3, particles=200) for times in
@@ -283,6 +342,7 @@ def test_trajectories_do_not_depend_on_the_output_times() -> None:
         np.testing.assert_array_equal(few[name].sel(time=2.0), many[name].sel(time=2.0))
 
 
+@extinction
 def test_nothing_is_left() -> None:
     """Removal alone: each of the particles vanishes by itself, and nothing comes after the last."""
     ds = simulated(

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import smolux as sx
-from shared import QUICK
+from shared import QUICK, extinction
 from smolux.assembly import rates_for
 from smolux.errors import InputError
 
@@ -86,6 +86,7 @@ QUICK_CHAINS = {
 }
 
 
+@extinction
 @pytest.mark.parametrize(
     ("method", "q", "shattering", "evaporation", "depth"),
     [

@@ -5,18 +5,25 @@ from __future__ import annotations
 import inspect
 import pickle
 from dataclasses import MISSING, fields
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import smolux as sx
 from smolux import case as cases
-from smolux.deterministic.arguments import checked as of_solve
+from smolux.case import spatial as in_space
 from smolux.errors import InputError, Problem, about
 from smolux.kernels import KERNELS
-from smolux.planning import checked as of_simulate
 from smolux.planning import make_plan
-from smolux.settings import Control, Settings, SolverSettings, from_plain, plain
+from smolux.settings import (
+    Control,
+    Settings,
+    SolverSettings,
+    SpatialSettings,
+    from_plain,
+    plain,
+)
 
 MODEL = sx.Model(sx.kernels.Constant())
 CASE = '[kernel]\nname = "constant"\n'
@@ -31,6 +38,8 @@ def names(table: Any) -> set[str]:
     [
         (sx.simulate, [Settings, Control], {"model"}),
         (sx.solve, [SolverSettings], {"model", "progress", "largest", "max_size"}),
+        (sx.spatial.simulate, [SpatialSettings], {"system", "method"}),
+        (sx.spatial.resume, [SpatialSettings], {"result"}),
     ],
 )
 def test_a_function_takes_what_is_declared(call: Any, tables: Any, apart: set[str]) -> None:
@@ -68,6 +77,28 @@ VALUES: dict[str, list[Any]] = {
 }
 
 
+#: the same of discs in a box
+IN_SPACE: dict[str, list[Any]] = {
+    "until": [1.5, 0, float("inf"), "1"],
+    "clusters": [3, 0, 0.5],
+    "times": [[0, 1], [0], [], [2, 1], [-1, 1]],
+    "max_events": [10, 10.5, 0],
+    "time_limit": [1.0, 0],
+}
+
+
+@pytest.mark.parametrize("name", IN_SPACE)
+def test_a_case_in_space_refuses_what_a_run_refuses(name: str, tmp_path: Path) -> None:
+    file = tmp_path / "case.toml"
+    for value in IN_SPACE[name]:
+        found = refused(SpatialSettings.checked, {name: value})
+        written = '"1"' if value == "1" else "inf" if value == float("inf") else repr(value)
+        file.write_text(f"[spatial]\ndiscs = 100\n{name} = {written}\n")
+        there = refused(in_space.load, file)
+        assert len(found) == len(there) <= 1, (value, found, there)
+        assert not found or found[0].cure in there[0], (found, there)  # type: ignore[attr-defined]
+
+
 def refused(call: Any, *args: Any) -> list[str]:
     try:
         call(*args)
@@ -78,7 +109,7 @@ def refused(call: Any, *args: Any) -> list[str]:
 
 @pytest.mark.parametrize(
     ("section", "table", "check"),
-    [("run", Settings, of_simulate), ("solve", SolverSettings, of_solve)],
+    [("run", Settings, Settings.for_model), ("solve", SolverSettings, SolverSettings.for_model)],
 )
 def test_a_case_file_and_a_call_agree_on_what_is_wrong(
     section: str, table: Any, check: Any
@@ -106,7 +137,7 @@ def test_what_goes_together_is_looked_at_together() -> None:
         "times": [1.0], "subvolumes": 64, "particles": 1000, "target_error": 0.1, "replicas": 3,
         "remix": 50, "weighting": "auto", "target": "largest",
     }  # fmt: skip
-    found = refused(of_simulate, MODEL, given)
+    found = refused(Settings.for_model, MODEL, given)
     assert {p.path for p in found} == {  # type: ignore[attr-defined]
         ("remix",), ("target",), ("subvolumes",), ("replicas",),
     }  # fmt: skip

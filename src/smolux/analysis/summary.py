@@ -130,7 +130,7 @@ def _notes(ds: xr.Dataset, result: xr.Dataset, exact: xr.Dataset | None) -> list
     extinct = int(np.isfinite(ds["extinction_time"].values).sum()) if "extinction_time" in ds else 0
     if extinct:
         notes.append(
-            f"In {extinct} of {replicas} replicas everything became one cluster; they stay in the "
+            f"In {extinct} of {replicas} replicas one cluster was left, or none; they stay in the "
             "means."
         )
     if exact is None:

@@ -14,11 +14,10 @@ import numpy as np
 from .. import units
 from ..errors import InputError, did_you_mean
 from ..executors import KINDS
-from ..settings import Control, Settings, SolverSettings, simulation, solution
+from ..settings import Control, Settings, SolverSettings
 from ..settings.kinds import Kind, Seconds, Times, declared
 from ..settings.solution import OBSERVED
 from ..weighting import WeightFunction
-from ..weighting.weight_function import STEEPEST
 from .reader import Problems, Table, show
 
 #: the most output times a table of times may ask for
@@ -74,10 +73,10 @@ def read_run(content: Any, problems: Problems) -> Run | None:
     table = Table(content, ("run",), problems)
     before = len(problems.messages)
     good = _read(Run, table)
-    exponent = _exponent(table)
-    if exponent is not None and good.get("weighting") == WeightFunction.name:
-        good["weighting"] = WeightFunction(exponent)
-    for wrong in simulation.disagreements(good):
+    weighting = _weight_function(table)
+    if weighting is not None:
+        good["weighting"] = weighting
+    for wrong in Run.disagreements(good):
         table.wrong(wrong)
     table.finish()
     return Run(**good) if len(problems.messages) == before else None
@@ -114,7 +113,7 @@ def read_key(table: Table, key: str, kind: Kind, default: Any) -> Any:
     return default
 
 
-def _exponent(table: Table) -> float | None:
+def _weight_function(table: Table) -> WeightFunction | None:
     """Read the power of the size that is the weight."""
     needed = table.content.get("weighting") == WeightFunction.name
     if "exponent" not in table:
@@ -122,14 +121,16 @@ def _exponent(table: Table) -> float | None:
         if needed:
             table.require("exponent", "the power q of the weight function l**q, such as 0.5")
         return None
-    value: float | None = table.number("exponent", None)
+    value = table.number("exponent", None)
     if not needed:
         table.bad("exponent", 'is for weighting = "weight-function"; take one of both out')
         return None
-    if value is not None and not abs(value) <= STEEPEST:
-        table.bad("exponent", f"must be a number from -{STEEPEST:g} to {STEEPEST:g}")
-        return None
-    return value
+    try:
+        return None if value is None else WeightFunction(value)
+    except InputError as error:
+        for wrong in error.problems:
+            table.bad("exponent", getattr(wrong, "cure", wrong))
+    return None
 
 
 def read_parallel(content: Any, run: Run | None, problems: Problems) -> Parallel:
@@ -165,7 +166,7 @@ def read_solve(content: Any, run: Run | None, beside: bool, problems: Problems) 
     for former, key in (("largest", "window"), ("max_size", "max_window")):
         _rename(table, former, key)
     good = _read(Solve, table, names) | shared
-    for wrong in solution.disagreements(good):
+    for wrong in Solve.disagreements(good):
         table.wrong(wrong)
     table.finish()
     return Solve(**good) if "times" in good and len(problems.messages) == before else None
@@ -205,7 +206,7 @@ def read_output(content: Any, problems: Problems) -> Output:
     return output
 
 
-def read_times(table: Table) -> tuple[float, ...] | None:
+def read_times(table: Table, kind: Kind | None = None) -> tuple[float, ...] | None:
     """Read output times: a list, or a table of start, stop, count and spacing."""
     value = table.take("times")
     if value is None:
@@ -219,11 +220,12 @@ def read_times(table: Table) -> tuple[float, ...] | None:
     if None in times:
         return None
     try:
-        return Times().check("times", times)
+        found: tuple[float, ...] | None = (kind or Times()).check("times", times)
     except InputError as error:
         for wrong in error.problems:
             table.wrong(wrong)
         return None
+    return found
 
 
 def _spaced(value: Mapping[str, Any], parent: Table) -> tuple[float, ...] | None:

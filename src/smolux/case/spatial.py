@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from ..settings.kinds import Seconds
+from ..settings import SpatialSettings
+from ..settings.kinds import declared, kinds
 from . import contents, read_text
 from .reader import Problems, Table, show
 from .settings import read_key, read_times
@@ -26,6 +27,8 @@ FIGURES = (
 _TRAJECTORIES = ("none", "xyz", "gsd")
 #: settings that only time stepping has
 _STEPPING = ("step", "rigid")
+#: arguments of `smolux.spatial.simulate`
+_RUN = {name: kind for name, kind in kinds(SpatialSettings).items() if name != "progress"}
 
 
 @dataclass(frozen=True)
@@ -44,11 +47,11 @@ class Flight:
     method: str = "windowed"
     step: float | None = None
     rigid: bool | None = None
-    times: tuple[float, ...] | None = None
-    clusters: int = 1
-    until: float | None = None
-    max_events: int | None = None
-    time_limit: float | None = None
+    times: tuple[float, ...] | None = declared(SpatialSettings, "times")
+    clusters: int = declared(SpatialSettings, "clusters")
+    until: float | None = declared(SpatialSettings, "until")
+    max_events: int | None = declared(SpatialSettings, "max_events")
+    time_limit: float | None = declared(SpatialSettings, "time_limit")
 
     def system(self) -> System:
         """Place the discs.
@@ -77,11 +80,10 @@ class Flight:
         """Arguments of `smolux.spatial.simulate` beside the system."""
         from ..spatial.methods import METHODS
 
-        names = ("times", "clusters", "until", "max_events", "time_limit")
         given = {name: getattr(self, name) for name in _STEPPING}
         settings = {name: value for name, value in given.items() if value is not None}
         method = next(m for m in METHODS if m.name == self.method)(**settings)
-        return {"method": method} | {name: getattr(self, name) for name in names}
+        return {"method": method} | {name: getattr(self, name) for name in _RUN}
 
 
 @dataclass(frozen=True)
@@ -171,12 +173,12 @@ def _read_flight(content: Any, problems: Problems) -> Flight | None:
         "method": table.choice("method", Flight.method, [m.name for m in METHODS]),
         "step": table.number("step", None, above=0.0),
         "rigid": table.flag("rigid", False) if "rigid" in table else None,
-        "times": read_times(table) if "times" in table else None,
-        "clusters": table.integer("clusters", Flight.clusters, 1),
-        "until": table.number("until", None, above=0.0),
-        "max_events": table.integer("max_events", None, 1),
-        "time_limit": read_key(table, "time_limit", Seconds(optional=True), None),
     }
+    for name, kind in _RUN.items():
+        if name == "times":
+            settings[name] = read_times(table, kind) if name in table else None
+        else:
+            settings[name] = read_key(table, name, kind, getattr(Flight, name))
     if settings["initial"] == "lattice" and settings["radius_sigma"] > 1:
         table.bad("radius_sigma", 'on a lattice all discs are equal; use initial = "random"')
     if len(settings["walls"]) not in (1, settings["dimension"]):

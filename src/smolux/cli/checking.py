@@ -10,11 +10,11 @@ from ..case import Case, Parallel, Run
 from ..case.physics import model_tables
 from ..case.settings import as_table
 from ..case.write import value
-from ..deterministic.arguments import checked as solver_settings
 from ..errors import InputError
 from ..executors import check_installed
 from ..planning import make_plan
 from ..resources import cores
+from ..settings import SolverSettings
 from .console import amount, duration
 from .estimate import estimate, negative_rates, physics_warnings
 
@@ -56,7 +56,7 @@ def refusals(case: Case) -> list[str]:
             given["weighting"] = "number"
         plans.append(partial(make_plan, case.model, **given))
     if case.solve is not None:
-        plans.append(partial(solver_settings, case.model, case.solve_arguments()))
+        plans.append(partial(SolverSettings.for_model, case.model, case.solve_arguments()))
     found = []
     for plan in plans:
         try:

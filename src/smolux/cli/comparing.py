@@ -85,7 +85,7 @@ def compute(
     for number, name in enumerate(methods):
         console.say(f"{name} ...")
         if name == SOLVER:
-            with display(what="solving") as progress:
+            with display(first="solving") as progress:
                 try:
                     found.append(_solved(case, progress))
                 except SolverError as error:

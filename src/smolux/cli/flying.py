@@ -15,11 +15,11 @@ from ..case import spatial as cases
 from ..case.spatial import FIGURES, SpatialCase
 from ..errors import InputError, Interrupted, did_you_mean, quiet
 from ..spatial.running import checked
+from ..stopping import ALL, Stopper
 from . import rundir
 from .console import amount, duration, say
 from .progress import Display
 from .rundir import RunDirectory
-from .signals import Stopper
 
 _DPI = 200
 
@@ -74,8 +74,7 @@ def _simulate(case: SpatialCase, directory: RunDirectory, before: Any) -> Any:
         say(f"going on at t = {before.attrs['time_reached']:.6g}")
         begun = partial(spatial.resume, before)
         del arguments["method"]
-    with Stopper() as stopper, Display(stopper.check) as progress, quiet():
-        stopper.patient = True
+    with Stopper(ALL, say=say) as stopper, Display(stopper.check) as progress, quiet():
         try:
             tree = begun(progress=progress, **arguments)
         except Interrupted as stop:
@@ -196,7 +195,8 @@ def described(case: cases.SpatialCase, source: str) -> str:
         If they do not, or for what a run would refuse.
     """
     system = case.with_seed().run.system()
-    checked(system, progress=None, **case.run.arguments())
+    given = case.run.arguments()
+    checked(system, given.pop("method"), given)
     run_ = case.run
     memory = 450 * len(system)
     lines = [

@@ -7,37 +7,10 @@ import sys
 import time
 from collections.abc import Callable
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Any
 
+from ..progress import Progress
 from .console import amount, duration, say
-
-
-class Progress(Protocol):
-    """What `smolux.simulate` and `smolux.solve` report."""
-
-    @property
-    def events(self) -> int:
-        """Collisions, or time steps, so far."""
-
-    @property
-    def fraction(self) -> float:
-        """Share that is done."""
-
-    @property
-    def events_per_second(self) -> float:
-        """Speed."""
-
-    @property
-    def seconds_left(self) -> float:
-        """Estimate; NaN when nothing is known yet."""
-
-    @property
-    def compile_seconds(self) -> float:
-        """Spent on compiling."""
-
-    @property
-    def bounds_seconds(self) -> float:
-        """Spent on bounds of rates."""
 
 
 class Display:
@@ -49,8 +22,8 @@ class Display:
         Called each time; may raise to stop the run.
     terminal : bool, optional
         Whether there is a terminal for a bar; found out if left out.
-    what : {"simulating", "solving", "sweeping"}
-        What is done, for the bar.
+    first : str
+        What is done before anything is told, for the bar.
     every : float
         Seconds between two lines where there is no terminal.
     clock : callable
@@ -61,13 +34,12 @@ class Display:
         self,
         check: Callable[[], None] | None = None,
         terminal: bool | None = None,
-        what: str = "simulating",
+        first: str = "compiling",
         every: float = 10.0,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.terminal = sys.stderr.isatty() if terminal is None else terminal
-        self.check, self.what, self.every, self.clock = check, what, every, clock
-        self.unit = "steps" if what == "solving" else "events"
+        self.check, self.first, self.every, self.clock = check, first, every, clock
         self.last: Progress | None = None
         self._due = self._bounds = 0.0
         self._bar: Any = None
@@ -100,13 +72,14 @@ class Display:
         self.last = progress
         if self._bar is not None:
             self._bar.update(
-                self._task, total=1.0, completed=progress.fraction, description=self.what,
-                rate=", ".join(p for p in (rate(progress, self.unit), error(progress)) if p),
+                self._task, total=None if math.isnan(progress) else 1.0,
+                completed=0.0 if math.isnan(progress) else progress, description=progress.what,
+                rate=", ".join(p for p in (rate(progress), progress.note) if p),
                 left=left(progress),
             )  # fmt: skip
         elif self.clock() >= self._due:
             self._due = self.clock() + self.every
-            say(line(progress, self.unit))
+            say(line(progress))
         if self.check is not None:
             self.check()
 
@@ -131,43 +104,28 @@ class Display:
             console=console(True, self.terminal),
             transient=True,
         )
-        first = "compiling" if self.what == "simulating" else self.what
-        self._task = self._bar.add_task(first, total=None, rate="", left="")
+        self._task = self._bar.add_task(self.first, total=None, rate="", left="")
         self._bar.start()
 
 
-def rate(progress: Progress, unit: str = "events") -> str:
+def rate(progress: Progress) -> str:
     """Write the speed: ``"2.1 M events/s"``."""
-    return f"{amount(progress.events_per_second)} {unit}/s"
+    return f"{amount(progress.events_per_second)} {progress.unit}/s"
 
 
 def left(progress: Progress) -> str:
     """Write the time left: ``"40 s left"``; nothing while it is not known."""
-    known = progress.seconds_left == progress.seconds_left
+    known = not math.isnan(progress.seconds_left)
     return f"{duration(progress.seconds_left)} left" if known else ""
 
 
-def error(progress: Progress) -> str:
-    """Write how near a target error is: ``"±0.31 % of ±0.1 %, 16 replicas"``; often nothing.
-
-    Of a sweep, how many of its points are done.
-    """
-    if hasattr(progress, "note"):
-        return str(progress.note)
-    reached, wanted = (getattr(progress, k, math.nan) for k in ("error", "target_error"))
-    if not (math.isfinite(reached) and math.isfinite(wanted)):
-        return ""
-    replicas = getattr(progress, "replicas", 0)
-    return f"±{100 * reached:.2g} % of ±{100 * wanted:.2g} %, {replicas} replicas"
-
-
-def line(progress: Progress, unit: str = "events") -> str:
+def line(progress: Progress) -> str:
     """Write all in a line: ``"43 %, 1.2 M events, 2.1 M events/s, 40 s left"``."""
     parts = (
-        f"{100 * progress.fraction:.0f} %",
-        f"{amount(progress.events)} {unit}",
-        rate(progress, unit),
-        error(progress),
+        "" if math.isnan(progress) else f"{100 * progress:.0f} %",
+        f"{amount(progress.events)} {progress.unit}",
+        rate(progress),
+        progress.note,
         left(progress),
     )
     return ", ".join(part for part in parts if part)

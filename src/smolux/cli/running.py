@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +25,11 @@ from ..executors import opened
 from ..model_dict import model_to_dict
 from ..observables import units
 from ..settings import Settings
+from ..stopping import ALL, Stopper
 from . import figures, report
 from .console import duration, say
 from .progress import Display
 from .rundir import RunDirectory
-from .signals import Stopper
 
 
 @dataclass
@@ -66,7 +67,7 @@ def proceed(directory: RunDirectory, display: Callable[..., Display] = Display) 
         run goes on from there, if it had a checkpoint.
     """
     case = directory.load()
-    with Stopper() as stopper, quiet():
+    with Stopper(ALL, patient=False, say=say) as stopper, quiet():
         try:
             return _stages(case, directory, stopper, display)
         except KeyboardInterrupt as stop:
@@ -182,18 +183,11 @@ def _simulate(
 
     with display(check=check) as progress:
         try:
-            ds = _computed(case, directory, progress)
-        except (Interrupted, InputError, WorkerError) as stop:
-            stopper.patient = True
-            if stop.dataset is not None:  # what there was until then is right
-                _store(stop.dataset, case, directory.results)
-            if not isinstance(stop, Interrupted):
-                if stop.dataset is not None:
-                    say(f"what was computed until then is in {directory.results}")
-                raise
+            ds = _stored(
+                partial(_computed, case, directory, progress), case, directory.results, stopper
+            )
+        except Interrupted as stop:
             raise Interrupted(f"{str(stop).partition(';')[0]}{_share(progress)}") from None
-        stopper.patient = True
-    _store(ds, case, directory.results)
     if not ds.attrs["complete"]:
         raise Interrupted(f"{ds.attrs['stopped']}{_share(progress)}")
     # not before: whatever happens between, the run can go on from it
@@ -238,16 +232,31 @@ def _computed(case: Case, directory: RunDirectory, progress: Display) -> Any:
 
 def _solve(case: Case, file: Path, display: Callable[..., Display]) -> Any:
     settings = case.solve_arguments()
-    with display(what="solving") as progress:
-        try:
-            ds = solve(case.model, **settings, progress=progress)
-        except (Interrupted, InputError, SolverError) as stop:
-            if stop.dataset is not None:  # what there was until then is right
-                _store(stop.dataset, case, file)
-                say(f"what was computed until then is in {file}")
-            raise
-    _store(ds, case, file)
+    with display(first="solving") as progress:
+        ds = _stored(partial(solve, case.model, **settings, progress=progress), case, file)
     say(f"solved in {duration(float(ds.attrs['wall_seconds']))}")
+    return ds
+
+
+def _stored(
+    compute: Callable[[], Any], case: Case, file: Path, stopper: Stopper | None = None
+) -> Any:
+    """Compute and save the result; also what there was when something ended it: that is right.
+
+    Nothing stops this before it is saved, if there is a `stopper`.
+    """
+    try:
+        ds = compute()
+    except (Interrupted, InputError, SolverError, WorkerError) as stop:
+        if stopper is not None:
+            stopper.patient = True
+        if stop.dataset is not None:
+            _store(stop.dataset, case, file)
+            say(f"what was computed until then is in {file}")
+        raise
+    if stopper is not None:
+        stopper.patient = True
+    _store(ds, case, file)
     return ds
 
 

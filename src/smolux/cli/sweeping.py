@@ -9,12 +9,12 @@ from typing import Any
 import smolux
 
 from ..errors import InputError, Interrupted, quiet
+from ..stopping import ALL, Stopper
 from ..sweeps import go_on
 from ..sweeps.grid import failures
 from . import showing
 from .console import say
 from .progress import Display
-from .signals import Stopper
 
 
 def proceed(
@@ -37,10 +37,9 @@ def proceed(
     if begun and (over or sets or output is not None):
         raise InputError(f"{case}: is a sweep that was begun: it goes on as it is, without options")
     folder = case if begun else output or Path(f"{case.stem}-sweep")
-    with Stopper() as stopper, quiet():
-        stopper.patient = False
+    with Stopper(ALL, patient=False, say=say) as stopper, quiet():
         try:
-            with display(check=stopper.check, what="sweeping") as progress:
+            with display(check=stopper.check, first="sweeping") as progress:
                 ds: Any = (
                     go_on(folder, progress=progress)
                     if begun

@@ -12,6 +12,7 @@ from ..errors import InputError, Interrupted, did_you_mean
 from ..weighting import WEIGHTINGS, WeightFunction
 from ..weighting.base import Weighting
 from . import console
+from .progress import Display
 
 
 def weightings_of(texts: Sequence[str]) -> list[str | Weighting]:
@@ -73,17 +74,19 @@ def run(
         f"seed {settings.seed}, {settings.replicas:,} replicas of {settings.particles:,} particles"
     )
     try:
-        ds = ensembles.efficiency(
-            seeded.model,
-            methods or [settings.method],
-            chosen,
-            list(observables or dict.fromkeys([settings.target, "M2"])),
-            times=settings.times,
-            population=settings.population,
-            particles=settings.particles,
-            replicas=settings.replicas,
-            seed=settings.seed,
-        )
+        with Display() as display:
+            ds = ensembles.efficiency(
+                seeded.model,
+                methods or [settings.method],
+                chosen,
+                list(observables or dict.fromkeys([settings.target, "M2"])),
+                times=settings.times,
+                population=settings.population,
+                particles=settings.particles,
+                replicas=settings.replicas,
+                seed=settings.seed,
+                progress=display,
+            )
     except (InputError, Interrupted) as early:
         if early.dataset is not None:
             _print(early.dataset)

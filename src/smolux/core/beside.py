@@ -25,37 +25,26 @@ import numpy as np
 from . import rng
 from .bounds import thinned
 from .compile import cold_piece, piece
-from .loop import make_choose_process, schedule
+from .fire import Books, Kinds
+from .loop import schedule
 from .state import (
-    BAD_FACTOR,
     BAD_RATE,
-    BAD_SHARE,
-    BY_KERNEL,
     BY_SPLITS,
     CLOCKS,
-    DRAW,
-    EVENTS,
     FIRST,
-    GROW,
     IN_DOUBT,
     KIND,
-    LARGEST,
     LATE,
-    LIMIT,
     LONE,
     LONE_PART,
     LONE_PROCESS,
     LONE_SIZE,
-    MASS_IN,
     MASS_OUT,
+    ONE,
+    OTHER,
     PENDING,
-    PHASE,
-    PROCESS,
-    SINCE,
     SPLIT_IN_DOUBT,
-    SPLITS,
     TIME,
-    TOO_LARGE,
     TRIALS,
     VOLUME,
     WANTED,
@@ -122,17 +111,15 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
                 return reason
         s.missed[IN_DOUBT] = s.missed[SPLIT_IN_DOUBT] = 0.0
         late = s.count[LATE] == 1
-        wait = first = limit = math.inf
-        looked = np.int64(0)
-        for turn in range(2):
-            if late == (turn == 0):
-                first = other(s, w, windows, q, wait)
-                if late:
-                    limit = min(first, windows.edges[s.count[WINDOW] + 1] - s.clock[TIME])
-            else:
-                before = s.count[TRIALS]
-                wait = encounter(s, w, windows, p, limit)
-                looked = s.count[TRIALS] - before
+        first = limit = math.inf
+        if late:
+            first = other(s, w, windows, q, math.inf)
+            limit = min(first, windows.edges[s.count[WINDOW] + 1] - s.clock[TIME])
+        before = s.count[TRIALS]
+        wait = encounter(s, w, windows, p, limit)
+        looked = s.count[TRIALS] - before
+        if not late:
+            first = other(s, w, windows, q, wait)
         if math.isnan(wait) or math.isnan(first):
             return BAD_RATE
         if wait < first:
@@ -194,30 +181,16 @@ def make_choice(lone_factor: Any, source_factor: Any, pairs: int, lones: int, so
     return choose
 
 
-def make_fire(
-    pieces: Any,
-    pair_outcome: Any,
-    factor: Any,
-    lone_outcome: Any,
-    choose: Any,
-    stands: Any,
-    rounded: Any,
-    ledger: Any,
-    known: Any,
-    pairs: int,
+def make_kinds(
+    encounters: Kinds, lone_outcome: Any, choose_other: Any, stands: Any, rounded: Any, pairs: int,
     lones: int,
-    share: Any = None,
-) -> Any:
-    """Bind what happens when the pending event comes; see `smolux.core.loop.make_fire`.
+) -> Kinds:  # fmt: skip
+    """Bind the events beside encounters to these, see `smolux.core.fire.Kinds`.
 
-    `stands` is ``stands(size, p)``, how many particles a simulated one stands for; `rounded` rounds
-    what appears, ``rounded(s, entries, size, p)``, when a particle of one size is replaced. The
-    `ledger` and `known` are those of `smolux.core.lone`, and not called if nothing happens to
-    single particles.
+    `choose_other` is that of `make_choice`, `stands` is ``stands(size, p)``, how many particles a
+    simulated one stands for; `rounded` rounds what appears, ``rounded(s, entries, size, p)``, when
+    a particle of one size is replaced.
     """
-    choose_pair = make_choose_process(pairs, pieces.pair, share)
-    pair, update = pieces.pair, pieces.update
-    enter, leave = ledger.enter, ledger.leave
 
     @cold_piece
     def pick(s, windows, r):
@@ -229,9 +202,52 @@ def make_fire(
             m += 1
         return windows.size[k, m]
 
+    @piece
+    def alive(s):
+        if s.count[KIND] == PAIR:
+            return encounters.alive(s)
+        return s.count[LONE] >= 0 or s.count[KIND] == SOURCE
+
+    @piece
+    def choose(s, w, windows, q):
+        if s.count[KIND] == PAIR:
+            return encounters.choose(s, w, windows, q)
+        return choose_other(s, windows, q)
+
+    @cold_piece
+    def result(s, w, windows, r, p, q):
+        if s.count[KIND] == PAIR:
+            return encounters.result(s, w, windows, r, p, q)
+        if s.count[KIND] == ALONE:
+            size = s.count[LONE_SIZE]
+            entries, removes = lone_outcome(r - pairs, size, s.count[LONE_PART], s)
+            entries = rounded(s, entries, size, p)
+            left = float(size) * stands(size, p) if removes else 0.0
+            return entries, size, np.int64(0), ONE, 0.0, left
+        size = pick(s, windows, r)
+        s.sizes[0], s.counts[0] = size, 1
+        return 1, np.int64(0), np.int64(0), 0, float(size) * stands(size, p), 0.0
+
+    @piece
+    def note(s):
+        if s.count[KIND] == PAIR:
+            encounters.note(s)
+        elif s.count[KIND] == ALONE:
+            s.missed[BY_SPLITS] += s.missed[SPLIT_IN_DOUBT]
+
+    return Kinds(alive, choose, result, note)
+
+
+def make_books(stands: Any, ledger: Any, known: Any, lones: int) -> Books:
+    """Bind what is kept beside, see `smolux.core.fire.Books`.
+
+    The `ledger` and `known` are those of `smolux.core.lone`, and not called if nothing happens to
+    single particles.
+    """
+    enter, leave = ledger.enter, ledger.leave
+
     @cold_piece
     def cut_off(s, windows, entries, p):
-        """Take out what appears beyond the limit; return how many entries are left."""
         kept = 0
         for e in range(entries):
             if s.sizes[e] > windows.cut[0]:
@@ -243,28 +259,7 @@ def make_fire(
         return kept
 
     @cold_piece
-    def result(s, w, windows, r, p, q):
-        """Write what appears; how many entries, and the sizes of what is there and may vanish.
-
-        Then what of both does (bits 1 and 2), and the mass that comes in and goes out.
-        """
-        if s.count[KIND] == PAIR:
-            i, j = pair(s, w)
-            entries, gone = pair_outcome(r, i, j, s, p, q)
-            return entries, i, j, gone, 0.0, 0.0
-        if s.count[KIND] == ALONE:
-            size = s.count[LONE_SIZE]
-            entries, removes = lone_outcome(r - pairs, size, s.count[LONE_PART], s)
-            entries = rounded(s, entries, size, p)
-            left = float(size) * stands(size, p) if removes else 0.0
-            return entries, size, np.int64(0), 1, 0.0, left
-        size = pick(s, windows, r)
-        s.sizes[0], s.counts[0] = size, 1
-        return 1, np.int64(0), np.int64(0), 0, float(size) * stands(size, p), 0.0
-
-    @cold_piece
     def wanting(s, entries, q):
-        """Whether bounds of the splits of something that appears are to be asked for."""
         for e in range(entries):
             if not known(s.sizes[e], q):
                 s.count[WANTED] = s.sizes[e]
@@ -273,70 +268,11 @@ def make_fire(
 
     @piece
     def book(s, gone, i, j, entries, q):
-        """Bring the counts of single particles up to date."""
-        if gone & 1:
+        if gone & ONE:
             leave(s, i)
-        if gone & 2:
+        if gone & OTHER:
             leave(s, j)
         for e in range(entries):
             enter(s, s.sizes[e], s.counts[e], q)
 
-    @piece
-    def exchange(s, w, windows, r, p, q):
-        """Carry out process `r`: 0, or the reason to return, with nothing changed."""
-        a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
-        entries, i, j, gone, come, left = result(s, w, windows, r, p, q)
-        highest = np.int64(0)
-        for e in range(entries):
-            highest = max(highest, s.sizes[e])
-        if highest >= LIMIT:
-            return TOO_LARGE
-        out, cut = s.clock[MASS_OUT], s.events[windows.cut[1]]
-        if highest > windows.cut[0]:
-            entries = cut_off(s, windows, entries, p)
-        reason = 0
-        if lones > 0 and wanting(s, entries, q.lone):
-            reason = SPLITS
-        elif not update(s, w, gone, entries, p):
-            reason = GROW
-        if reason != 0:
-            s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
-            s.clock[MASS_OUT], s.events[windows.cut[1]] = out, cut
-            return reason
-        if lones > 0:
-            book(s, gone, i, j, entries, q.lone)
-        for e in range(entries):
-            s.count[LARGEST] = max(s.count[LARGEST], s.sizes[e])
-        s.clock[MASS_IN] += come
-        s.clock[MASS_OUT] += left
-        s.attempts[windows.cut[1]] += s.events[windows.cut[1]] - cut
-        s.events[r] += 1
-        s.count[SINCE] += 1
-        return 0
-
-    @piece
-    def fire(s, w, windows, p, q):
-        kind = s.count[KIND]
-        alive = s.count[FIRST] >= 0 if kind == PAIR else s.count[LONE] >= 0 or kind == SOURCE
-        if alive:
-            r = s.count[PROCESS]
-            if r < 0:
-                encounter = kind == PAIR
-                r = choose_pair(s, w, windows, factor, q) if encounter else choose(s, windows, q)
-                if r <= -2:
-                    return BAD_SHARE if r == -4 else BAD_FACTOR
-                s.count[PROCESS] = r
-            if r >= 0:
-                reason = exchange(s, w, windows, r, p, q)
-                if reason != 0:
-                    return reason
-                if kind == PAIR:
-                    s.count[EVENTS] += 1
-                    s.missed[BY_KERNEL] += s.missed[IN_DOUBT]
-                elif kind == ALONE:
-                    s.missed[BY_SPLITS] += s.missed[SPLIT_IN_DOUBT]
-        s.clock[TIME] = s.clock[PENDING]
-        s.count[PHASE] = DRAW
-        return 0
-
-    return fire
+    return Books(cut_off, wanting, book, lones)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from .compile import cold_piece, piece
 from .state import (
+    BAD_FACTOR,
     CULPRIT,
     FLOOR,
     IN_DOUBT,
@@ -25,12 +24,13 @@ ROUNDING = 1.0 + 1e-12
 def thinned(s, r, value, bound, share):
     """Keep process `r` by its true factor, or none (-1); `share` is uniform below the bound of it.
 
-    A factor above its bound or without meaning is noted, and a number below -1 returned.
+    A factor above its bound or without meaning is noted, and the reason to return with a minus is
+    what comes back.
     """
     if not 0.0 <= value <= bound * ROUNDING:
         s.clock[VALUE] = value
         s.count[PROCESS] = r
-        return -2 if not 0.0 <= value < math.inf else -3
+        return -BAD_FACTOR
     return r if share < value else -1
 
 

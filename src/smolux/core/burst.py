@@ -17,6 +17,7 @@ from . import rng
 from .compile import piece
 from .state import (
     BAD_RATE,
+    BOTH,
     DOUBLE_AT,
     EVENTS,
     EXCESS,
@@ -156,7 +157,7 @@ def make_burst(
                 s.clock[PENDING] = pending
                 s.count[PHASE] = FIRE
                 break
-            n += count - (2 if gone == 3 else 1)
+            n += count - (2 if gone == BOTH else 1)
             events += 1
             s.events[r] += 1
             time = pending

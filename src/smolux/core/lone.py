@@ -24,6 +24,7 @@ from .slots import slot_of
 from .splits import bind_splits
 from .state import (
     CLOCKS,
+    COUNTED,
     CULPRIT,
     LARGEST,
     LONE,
@@ -202,8 +203,7 @@ def make_ledger(rates: Rates, visit: Callable[[Any], Any], count: int) -> Ledger
         for r in range(count):
             own = 0.0
             for k in range(o << LONE_BITS, (o + 1) << LONE_BITS):
-                # slot 0 holds no size, but whether all are counted
-                own += s.held[k] * s.most[r, k] if k > 0 else 0.0
+                own += s.held[k] * s.most[r, k] if k != COUNTED else 0.0
             s.sums[r, o] = own
 
     @cold_piece
@@ -241,7 +241,7 @@ def make_ledger(rates: Rates, visit: Callable[[Any], Any], count: int) -> Ledger
 
     @cold_piece
     def ready(s, w, p, q):
-        if s.held[0] == 1:
+        if s.held[COUNTED] == 1:
             return 0
         s.held[:] = 0
         s.most[:, :] = 0.0
@@ -250,7 +250,7 @@ def make_ledger(rates: Rates, visit: Callable[[Any], Any], count: int) -> Ledger
         count_all(s, w, s, q, p)
         if s.count[WANTED] > 0:
             return SPLITS
-        s.held[0] = 1
+        s.held[COUNTED] = 1
         return 0
 
     return Ledger(enter, leave, ready)
@@ -342,7 +342,7 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
                 return wait
             s.count[VAIN] += 1
             if s.count[VAIN] > _ENOUGH * s.count[PARTICLES] + PATIENCE:
-                s.held[0] = 0  # what had the largest rates may be gone
+                s.held[COUNTED] = 0  # what had the largest rates may be gone
                 break
         s.count[LONE] = -1
         return wait

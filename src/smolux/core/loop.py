@@ -16,44 +16,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any, NamedTuple
 
-from . import rng
-from .bounds import ROUNDING, note_bad, thinned
+from .after import make_after_event
 from .burst import Burst
 from .compile import cold_piece, entry, piece
 from .record import make_record
 from .state import (
-    BAD_FACTOR,
     BAD_RATE,
-    BAD_SHARE,
     BUDGET,
-    BY_KERNEL,
-    CLOCKS,
     DONE,
-    DOUBLE_AT,
-    DOUBLINGS,
     DRAW,
     EVENTS,
     EXCESS,
-    EXTENSIVE,
-    EXTINCT,
     FIRE,
-    FIRST,
-    GROW,
     IN_DOUBT,
-    LIMIT,
     NEXT,
-    PARTICLES,
     PAUSE,
     PAUSED,
     PENDING,
     PHASE,
     PROCESS,
-    SINCE,
     TIME,
-    TOO_LARGE,
     TRIALS,
     WINDOW,
 )
@@ -61,57 +45,6 @@ from .views import state_of, tally_of
 
 #: candidates looked at before the loop may return without an event
 PATIENCE = 4096
-
-
-@lru_cache(maxsize=64)
-def make_choose_process(
-    pairs: int, pair: Callable[..., Any] | None = None, share: Callable[..., Any] | None = None
-) -> Callable[..., Any]:
-    """Bind the choice of the process of an encounter, of the first `pairs` ones.
-
-    The `pair` is that of the method, and ``share(r, i, j, q)`` the share of the encounters of two
-    sizes in which process `r` takes place; None if that is all of them.
-    """
-    if pair is not None and share is not None:
-        choose = make_choose_process(pairs)
-
-        @piece
-        def choose_and_share(s, w, windows, factor, q):
-            """Choose the process, or none, also by the sizes; -4 if the share of them is none."""
-            r = choose(s, w, windows, factor, q)
-            if r < 0:
-                return r
-            i, j = pair(s, w)
-            value = share(r, i, j, q.shares)
-            if not 0.0 <= value <= ROUNDING:
-                note_bad(s, i, j, value)
-                s.count[PROCESS] = r
-                return -4
-            return r if rng.uniform(s.rng) < value else -1
-
-        return choose_and_share
-
-    @piece
-    def choose_process(s, w, windows, factor, q):
-        """Choose the process, or none: thinning by the true factor at the time of the event."""
-        window = s.count[WINDOW]
-        if pairs == 1 and windows.edges[window + 1] == math.inf:
-            return 0
-        excess = 0.0
-        for r in range(pairs):
-            excess += s.clock[CLOCKS + r]
-        x = rng.uniform(s.rng) * (windows.total[window] + excess)
-        r = 0
-        bound = windows.bounds[window, 0] + s.clock[CLOCKS]
-        while r < pairs - 1 and x >= bound:
-            x -= bound
-            r += 1
-            bound = windows.bounds[window, r] + s.clock[CLOCKS + r]
-        value = factor(r, s.clock[PENDING], q.factors)
-        # x is uniform below the bound, and serves again
-        return thinned(s, r, value, bound, x)
-
-    return choose_process
 
 
 class Pieces(NamedTuple):
@@ -207,76 +140,10 @@ def make_next_event(
     return next_event
 
 
-@lru_cache(maxsize=64)
-def make_fire(
-    pair: Callable[..., Any],
-    update: Callable[..., Any],
-    outcome: Callable[..., Any],
-    factor: Callable[..., Any],
-    random: bool,
-    pairs: int,
-    share: Callable[..., Any] | None = None,
-) -> Callable[..., Any]:
-    """Bind what happens when the pending event comes: 0 or the reason to return.
-
-    Parameters
-    ----------
-    pair, update : callable
-        Of the method, see `Pieces`.
-    outcome : callable
-        ``outcome(r, i, j, s, p, q)``: writes what process `r` makes of the sizes `i` and `j` into
-        ``s.sizes`` and ``s.counts``; returns how many entries, and which of both vanishes (bits 1
-        and 2).
-    factor : callable
-        ``factor(r, t, q)``: its rate as a multiple of the kernel.
-    random : bool
-        Whether the outcome draws random numbers.
-    pairs : int
-        How many processes there are.
-    share : callable, optional
-        See `make_choose_process`.
-    """
-    choose_process = make_choose_process(pairs, pair, share)
-
-    @piece
-    def fire(s, w, windows, p, q):
-        if s.count[FIRST] >= 0:
-            r = s.count[PROCESS]
-            if r < 0:
-                r = choose_process(s, w, windows, factor, q)
-                if r <= -2:
-                    return BAD_SHARE if r == -4 else BAD_FACTOR
-                s.count[PROCESS] = r
-            if r >= 0:
-                i, j = pair(s, w)
-                if random:  # the same numbers again, should there be no room
-                    a, b, c, d = s.rng[0], s.rng[1], s.rng[2], s.rng[3]
-                entries, gone = outcome(r, i, j, s, p, q)
-                for e in range(entries):
-                    if s.sizes[e] >= LIMIT:
-                        return TOO_LARGE
-                if not update(s, w, gone, entries, p):
-                    if random:
-                        s.rng[0], s.rng[1], s.rng[2], s.rng[3] = a, b, c, d
-                    return GROW
-                s.count[EVENTS] += 1
-                s.count[SINCE] += 1
-                s.events[r] += 1
-                s.missed[BY_KERNEL] += s.missed[IN_DOUBT]
-                s.missed[IN_DOUBT] = 0.0
-                if s.count[PARTICLES] == 1:
-                    s.clock[EXTINCT] = s.clock[PENDING]
-        s.clock[TIME] = s.clock[PENDING]
-        s.count[PHASE] = DRAW
-        return 0
-
-    return fire
-
-
-def make_loop(
+def make_advance(
     pieces: Pieces, next_event: Callable[..., Any], fire: Callable[..., Any]
 ) -> Callable[..., Any]:
-    """Assemble and compile the loop.
+    """Bind the way of one replica, from event to event.
 
     Parameters
     ----------
@@ -285,15 +152,14 @@ def make_loop(
     next_event : callable
         As `make_next_event` returns it.
     fire : callable
-        As `make_fire` returns it.
+        As `smolux.core.fire.make_fire` returns it.
 
     Returns
     -------
     callable
-        ``loop(state, work, tally, windows, grid, p, q, codes, budget)`` advances every replica
-        whose code is not `DONE` and writes why it returned into `codes`.
+        ``advance(s, w, tally, windows, grid, p, q, budget)``: why it returned.
     """
-    view, prepare, double = pieces.view, pieces.prepare, pieces.double
+    prepare, after_event = pieces.prepare, make_after_event(pieces.double)
     record = make_record(pieces.visit)
 
     @cold_piece
@@ -301,15 +167,9 @@ def make_loop(
         stop = s.count[TRIALS] + s.count[EVENTS] + budget
         while True:
             if s.count[PHASE] == DRAW:
-                while 0 < s.count[PARTICLES] <= s.count[DOUBLE_AT]:
-                    if not double(s, w):
-                        return GROW
-                    for column in EXTENSIVE:
-                        s.clock[column] *= 2.0
-                    s.count[DOUBLINGS] += 1
-                    s.clock[EXTINCT] = math.nan
-                    if s.held.shape[0] > 0:
-                        s.held[0] = 0
+                reason = after_event(s, w)
+                if reason != 0:
+                    return reason
                 reason = prepare(s, w, p)
                 if reason != 0:
                     return reason
@@ -334,6 +194,26 @@ def make_loop(
             reason = fire(s, w, windows, p, q)
             if reason != 0:
                 return reason
+
+    return advance
+
+
+def make_loop(advance: Callable[..., Any], view: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile the loop over replicas.
+
+    Parameters
+    ----------
+    advance : callable
+        As `make_advance` returns it.
+    view : callable
+        Of the method, see `Pieces`.
+
+    Returns
+    -------
+    callable
+        ``loop(state, work, tally, windows, grid, p, q, codes, budget)`` advances every replica
+        whose code is not `DONE` and writes why it returned into `codes`.
+    """
 
     def loop(state, work, tally, windows, grid, p, q, codes, budget):
         for r in range(codes.shape[0]):

@@ -22,7 +22,7 @@ from . import rng
 from .bounds import ROUNDING, note_bad
 from .compile import cold_piece, piece, user_piece
 from .slots import octave, slot_of, slot_top
-from .state import LONE_BITS, LONE_SLOTS, RAISED, SPLIT_IN_DOUBT, TRIALS
+from .state import COUNTED, LONE_BITS, LONE_SLOTS, RAISED, SPLIT_IN_DOUBT, TRIALS
 
 #: largest sizes of which all splits are gone through: in any case, where bounds are not proved and
 #: close, and in slots of narrow laws
@@ -226,7 +226,7 @@ def bind_splits(rate: Callable[..., Any]) -> tuple[Any, Any, Any]:
             if value > limit * raised * ROUNDING and row < 0:  # bounds found by trial only
                 s.missed[SPLIT_IN_DOUBT] = value / (limit * raised) - 1.0
                 s.clock[RAISED] = max(s.clock[RAISED], 1.1 * value / limit - 1.0)
-                s.held[0] = 0  # the rates of all sizes above are to be summed afresh
+                s.held[COUNTED] = 0  # the rates of all sizes above are to be summed afresh
             if rng.uniform(s.rng) * limit * raised < value:
                 return i
             if row < 0:

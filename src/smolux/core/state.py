@@ -52,7 +52,7 @@ COUNTS = len(_count)
 TIME = _clock("time", Rule.WHOLE)  # of the latest event
 PENDING = _clock("pending", Rule.APART)  # time of the next event
 VOLUME = _clock("volume", Rule.WHOLE, extensive=True)
-EXTINCT = _clock("extinct", Rule.WHOLE)  # when one particle was left; NaN before
+EXTINCT = _clock("extinct", Rule.WHOLE)  # since when one particle is left, or none; else NaN
 MAJORANT = _clock("majorant", Rule.APART)  # bound of the rate over the sizes present
 FLOOR = _clock("floor", Rule.MAXIMUM)  # least majorant, raised by repairs
 VALUE = _clock("value", Rule.APART)  # the value that broke a bound
@@ -90,6 +90,8 @@ PER_PROCESS = ("events", "attempts")
 LIMIT = 1 << 62
 
 DRAW, FIRE = 0, 1
+#: which of the pair of an event vanish
+ONE, OTHER, BOTH = 1, 2, 3
 
 # Why the loop returned.
 DONE = 0  # every output time is recorded
@@ -105,6 +107,8 @@ BAD_SHARE = 9  # a share of encounters is not between 0 and 1
 
 #: slots an octave by which single particles are told apart, as a power of two, and how many in all
 LONE_BITS = 3
+#: slot that holds no size, but 1 if all particles are counted
+COUNTED = 0
 LONE_SLOTS = 61 << LONE_BITS
 
 
@@ -123,7 +127,7 @@ class State(NamedTuple):
     attempts : int64 array of shape (R, P)
         Candidates of single particles, and particles that sources offered.
     held : int64 array of shape (R, slots)
-        Particles in each slot of sizes; entry 0 is 1 if they are counted. No slots if nothing
+        Particles in each slot of sizes, see also `COUNTED`. No slots if nothing
         happens to single particles.
     most : float64 array of shape (R, L, slots)
         Largest rate of a particle since its slot was last empty, for each process of these.

@@ -15,7 +15,7 @@ import numpy as np
 from .burst import Burst
 from .compile import cold_piece, piece
 from .loop import Pieces
-from .state import FIRST, PARTICLES, SECOND
+from .state import BOTH, FIRST, ONE, PARTICLES, SECOND
 
 
 class Store(NamedTuple):
@@ -111,17 +111,17 @@ def _make_update(
             s.sizes[0], s.counts[0] = 1, 0
             entries = 1
         a, b = s.count[FIRST], s.count[SECOND]
-        if gone == 3 and entries == 1 and exchange(s, w):
+        if gone == BOTH and entries == 1 and exchange(s, w):
             s.count[PARTICLES] += s.counts[0] - 2
             return True
         i = j = np.int64(0)
-        if gone == 3:
+        if gone == BOTH:
             i, j = size(s, w, a), size(s, w, b)
             take(s, w, max(a, b))  # the later place first: the other one is found where it was
             take(s, w, min(a, b))
             s.count[PARTICLES] -= 2
         elif gone > 0:
-            place = a if gone == 1 else b
+            place = a if gone == ONE else b
             i = size(s, w, place)
             take(s, w, place)
             s.count[PARTICLES] -= 1

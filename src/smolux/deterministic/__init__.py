@@ -1,9 +1,13 @@
 """The same model by rate equations: `solve`, steady states and their stability."""
 
+from ..progress import Progress
 from .hopf import HopfThreshold, hopf_threshold
 from .integrate import SolverError
-from .solver import Progress, solve
-from .steady import SteadyProgress, SteadyState, eigenvalues, steady_state
+from .solver import solve
+from .steady import SteadyState, eigenvalues, steady_state
+
+#: former name of `Progress`
+SteadyProgress = Progress
 
 __all__ = [
     "HopfThreshold",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,9 +14,10 @@ from ..content import frozen
 from ..errors import InputError, Interrupted
 from ..model import Model
 from ..processes import Source
+from ..progress import Progress
 from ..results import to_dataset, told
 from ..settings import SolverSettings
-from .arguments import checked, renamed
+from .arguments import renamed
 from .encounters import Encounters
 from .equations import Equations
 from .gel import may_gel
@@ -36,39 +37,6 @@ Float = NDArray[np.float64]
 _TICK = 0.2
 #: negative densities beyond this share of the number density are told
 _NOISE = 1e-10
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a solution is.
-
-    Attributes
-    ----------
-    events : int
-        Time steps so far.
-    fraction : float
-        Share of the time that is done, 0 to 1.
-    events_per_second : float
-    seconds_left : float
-        Estimated from the time done so far; NaN when nothing is known yet.
-    compile_seconds : float
-        Always zero: nothing is compiled.
-    time : float
-        Time reached.
-    window : int
-        The number of sizes now.
-    bounds_seconds : float
-        Always zero: nothing is bounded.
-    """
-
-    events: int
-    fraction: float
-    events_per_second: float
-    seconds_left: float
-    compile_seconds: float
-    time: float
-    window: int
-    bounds_seconds: float = 0.0
 
 
 def solve(
@@ -174,7 +142,7 @@ def solve(
         "max_window": max_window, "orders": orders, "sizes": sizes,
         "bins_per_octave": bins_per_octave, "gel": gel, "check": check,
     }  # fmt: skip
-    settings = checked(model, given)
+    settings = SolverSettings.for_model(model, given)
     model = frozen(model)
     dataset = Run(model, settings, progress).dataset()
     if check:
@@ -290,15 +258,17 @@ class Run:
         fraction = self.integrator.t / self.settings.times[-1]
         self.progress(
             Progress(
-                events=self.integrator.steps,
-                fraction=fraction,
-                events_per_second=self.integrator.steps / seconds,
-                seconds_left=seconds * (1.0 / fraction - 1.0) if fraction > 0 else np.nan,
-                compile_seconds=0.0,
-                time=self.integrator.t,
-                window=int(self.equations.sizes[-1]),
+                fraction,
+                "solving",
+                self.integrator.steps,
+                "steps",
+                self.integrator.steps / seconds,
+                seconds * (1.0 / fraction - 1.0) if fraction > 0 else np.nan,
+                counts={
+                    "time": self.integrator.t, "window": int(self.equations.sizes[-1]),
+                },
             )
-        )
+        )  # fmt: skip
 
     def records(self, seconds: float) -> Records:
         """Return what was observed so far."""

@@ -13,6 +13,7 @@ from scipy.sparse import linalg as krylov
 from ..content import frozen
 from ..errors import InputError
 from ..model import Model
+from ..progress import Progress
 from .arguments import renamed
 from .encounters import Encounters
 from .equations import Equations
@@ -43,27 +44,6 @@ _MEAN, _FIRST = 8.0, 256
 _WINDOW_TOLERANCE, _ROUGH_TOLERANCE = 1e-8, 1e-4
 #: an eigenvalue smaller than this, relative to the rate of collisions, is that of the mass
 _ZERO = 1e-6
-
-
-@dataclass(frozen=True)
-class SteadyProgress:
-    """How far the search for a steady state is.
-
-    Attributes
-    ----------
-    iteration : int
-    residual : float
-        As in `SteadyState`.
-    window : int
-        The number of sizes now.
-    seconds : float
-        Since the start.
-    """
-
-    iteration: int
-    residual: float
-    window: int
-    seconds: float
 
 
 @dataclass(frozen=True)
@@ -101,7 +81,7 @@ def steady_state(
     window: int | None = None,
     tolerance: float = 1e-11,
     guess: Float | None = None,
-    progress: Callable[[SteadyProgress], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
     largest: int | None = None,
 ) -> SteadyState:
     """Find a steady state of a model, stable or not, with the mass of its initial condition.
@@ -120,7 +100,7 @@ def steady_state(
     guess : ndarray of shape (M,), optional
         Densities to begin with.
     progress : callable, optional
-        Called with a `SteadyProgress` before each step.
+        Called with a `Progress` before each step.
     largest : int, optional
         Former name of `window`.
 
@@ -169,7 +149,7 @@ class _Search:
         model: Model,
         window: int | None,
         guess: Float | None,
-        progress: Callable[[SteadyProgress], None] | None,
+        progress: Callable[[Progress], None] | None,
     ) -> None:
         start = model.initial.densities(model.initial.largest)
         self.model, self.progress, self.window = model, progress, window
@@ -241,7 +221,20 @@ class _Search:
     def _tell(self, iteration: int) -> None:
         if self.progress is not None:
             seconds = time.perf_counter() - self.started
-            self.progress(SteadyProgress(iteration, self.residual, len(self.n), seconds))
+            self.progress(
+                Progress(
+                    np.nan,
+                    "looking for a steady state",
+                    iteration,
+                    "steps",
+                    iteration / seconds if seconds > 0 else 0.0,
+                    note=f"residual {self.residual:.2g}",
+                    counts={
+                        "iteration": iteration, "residual": self.residual,
+                        "window": len(self.n), "seconds": seconds,
+                    },
+                )
+            )  # fmt: skip
 
     def _failure(self) -> SolverError:
         reason = (

@@ -19,15 +19,16 @@ from smolux.checks import whole
 from smolux.content import frozen
 from smolux.core.rng import streams
 from smolux.core.state import BUDGET, DONE, State
-from smolux.errors import InputError
 from smolux.goal import FEWEST, Goal, named
 from smolux.initial import Sizes
 from smolux.methods.base import Method
 from smolux.model import Model
 from smolux.observe import observable
 from smolux.plan import Plan
-from smolux.planning import checked, decided
+from smolux.planning import decided
+from smolux.progress import Progress
 from smolux.replicas import Group, empty_state, initial_populations
+from smolux.settings import Settings
 from smolux.totals import Totals, attempts_of
 from smolux.weighting.base import Weighting
 
@@ -171,27 +172,24 @@ def make_sampler(
     number = whole(replicas)
     if number is None or number < 2:
         problems.append(f"replicas = {replicas!r}: must be a whole number of at least 2")
-    try:
-        settings = checked(
-            model,
-            {
-                "times": times,
-                "method": method,
-                "weighting": weighting,
-                "population": population,
-                "particles": particles,
-                "replicas": min(number or 1, _TOGETHER),
-                "seed": seed,
-                "orders": orders,
-                "sizes": min(max(sizes, min(_SIZES, whole(particles) or 1)), _LARGEST),
-                "bins_per_octave": 1,
-                "target": names[0] if names and not problems else "number_density",
-            },
-        )
-    except InputError as error:
-        raise InputError([*problems, *error.problems]) from None
-    if problems or number is None:
-        raise InputError(problems)
+    settings = Settings.for_model(
+        model,
+        {
+            "times": times,
+            "method": method,
+            "weighting": weighting,
+            "population": population,
+            "particles": particles,
+            "replicas": min(number or 1, _TOGETHER),
+            "seed": seed,
+            "orders": orders,
+            "sizes": min(max(sizes, min(_SIZES, whole(particles) or 1)), _LARGEST),
+            "bins_per_octave": 1,
+            "target": names[0] if names and not problems else "number_density",
+        },
+        problems,
+    )
+    assert number is not None
     plan = decided(frozen(model), settings)
     row = len(plan.times) * (plan.sizes + 64)
     together = min(_TOGETHER, _PARTICLES // plan.particles, _OBSERVED // row, number // _FEWEST)
@@ -221,7 +219,7 @@ def interleaved(
     samplers: Sequence[Sampler],
     replicas: int,
     workers: int,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> Iterator[tuple[Batch, ...]]:
     """Run the replicas of several samplers in turns; yield the batches of a turn, one of each.
 
@@ -235,14 +233,25 @@ def _in_order(
     samplers: Sequence[Sampler],
     replicas: int,
     workers: int,
-    progress: Callable[[float], None] | None,
+    progress: Callable[[Progress], None] | None,
 ) -> Iterator[Batch]:
     tasks = (
         (sampler.batch, first, min(sampler.plan.replicas, replicas - first))
         for first, sampler in _turns(samplers, replicas)
     )
     halt, waiting = Event(), deque[tuple[int, Future[Batch]]]()
-    done, total = 0, replicas * len(samplers)
+    done, total, started = 0, replicas * len(samplers), time.perf_counter()
+
+    def tell() -> None:
+        if progress is not None:
+            seconds, share = time.perf_counter() - started, done / total
+            progress(
+                Progress(
+                    share, "sampling", done, "replicas", done / seconds if seconds > 0 else 0.0,
+                    seconds * (1.0 / share - 1.0), counts={"replicas": done},
+                )
+            )  # fmt: skip
+
     with ThreadPoolExecutor(workers) as pool:
         try:
             for run, first, count in tasks:
@@ -251,10 +260,11 @@ def _in_order(
                     continue
                 done += waiting[0][0]
                 yield waiting.popleft()[1].result()
-                if progress is not None:
-                    progress(done / total)
+                tell()
             while waiting:
+                done += waiting[0][0]
                 yield waiting.popleft()[1].result()
+                tell()
         finally:
             halt.set()
             for _, future in waiting:

@@ -17,6 +17,7 @@ from smolux.deterministic.solver import solve
 from smolux.errors import InputError
 from smolux.methods.base import Method
 from smolux.model import Model
+from smolux.progress import Progress
 from smolux.results import provenance, told
 from smolux.weighting import WeightFunction
 from smolux.weighting.base import Weighting
@@ -58,7 +59,7 @@ def efficiency(
     schemes: Sequence[tuple[str | Method, str | Weighting]] | None = None,
     exact: ArrayLike | None = None,
     threads: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> xr.Dataset:
     """Measure bias, variance, cost and efficiency of methods and weightings.
 

@@ -16,6 +16,7 @@ from smolux.errors import InputError, Interrupted, OutOfMemoryError
 from smolux.methods.base import Method
 from smolux.model import Model
 from smolux.model_dict import model_to_dict
+from smolux.progress import Progress
 from smolux.resources import cores
 from smolux.results import provenance, told
 from smolux.weighting.base import Weighting
@@ -102,7 +103,7 @@ def ensemble(
     replicas: int = 1_000_000,
     seed: int | None = None,
     threads: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> xr.Dataset:
     """Simulate very many replicas of a small system and keep their statistics only.
 
@@ -127,7 +128,7 @@ def ensemble(
     threads : int, optional
         All cores if left out.
     progress : callable, optional
-        Called with the share that is done.
+        Called with a `Progress`: a number, the share that is done, with all else beside it.
 
     Returns
     -------
@@ -188,7 +189,7 @@ def collect(
     samplers: Sequence[Sampler],
     replicas: int,
     workers: int,
-    progress: Callable[[float], None] | None,
+    progress: Callable[[Progress], None] | None,
     dataset: Callable[..., xr.Dataset],
 ) -> xr.Dataset:
     """Run the replicas of all samplers in turns and return ``dataset(collected, *remarks)`` of all.

@@ -129,7 +129,10 @@ class Method:
 
     def collect(self, rates: Rates, piles: list[Any], state: State, mass: int) -> Any:
         """Return the work arrays of one replica with what `split` has put into these piles."""
-        return self.new_work(rates, [merged(piles)], state, mass)
+        sizes, counts = merged(piles)
+        if not sizes.size:  # all have left: a size of which there is none, as in an empty start
+            sizes, counts = np.ones(1, np.int64), np.zeros(1, np.int64)
+        return self.new_work(rates, [(sizes, counts)], state, mass)
 
     def learnt(self, work: Any, state: State) -> Any:
         """Return what was found out so far that holds for other stores of one replica, or None."""

@@ -6,7 +6,16 @@ declarations. A new argument is a field here and in the signature of its functio
 
 from .control import Control
 from .kinds import from_plain, plain
+from .motion import SpatialSettings
 from .simulation import PILOT, Settings
 from .solution import SolverSettings
 
-__all__ = ["PILOT", "Control", "Settings", "SolverSettings", "from_plain", "plain"]
+__all__ = [
+    "PILOT",
+    "Control",
+    "Settings",
+    "SolverSettings",
+    "SpatialSettings",
+    "from_plain",
+    "plain",
+]

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, Problem
-from .kinds import Called, File, Kind, Seconds, checked, setting
+from .arguments import Arguments
+from .kinds import Called, File, Kind, Seconds, setting
 
 
 class _Executor(Kind):
@@ -24,7 +25,7 @@ class _Executor(Kind):
 
 
 @dataclass(frozen=True)
-class Control:
+class Control(Arguments):
     """Where a run is computed, whom it tells, when it is kept and when it ends.
 
     See `smolux.simulate`.
@@ -39,15 +40,12 @@ class Control:
     time_limit: float | None = setting(Seconds(optional=True), None)
 
     @classmethod
-    def checked(cls, given: Mapping[str, Any]) -> tuple[Control, list[str]]:
-        """Return the arguments, as far as they are right, and what is wrong with the others."""
-        good, problems = checked(cls, given)
+    def disagreements(cls, good: Mapping[str, Any]) -> list[str]:
+        """See `Arguments`."""
         executor = good.get("executor")
-        if executor is not None and not isinstance(executor, ThreadPoolExecutor):
-            cure = "is only for runs on threads of this process; leave it out, or the executor"
-            problems += [
-                Problem(name, cure, given[name])
-                for name in ("checkpoint", "time_limit")
-                if given.get(name) is not None
-            ]
-        return cls(**good), problems
+        if executor is None or isinstance(executor, ThreadPoolExecutor):
+            return []
+        cure = "is only for runs on threads of this process; leave it out, or the executor"
+        names = ("checkpoint", "time_limit")
+        given = {n: good[n] for n in names if good.get(n) is not None}
+        return [Problem(n, cure, str(v) if isinstance(v, Path) else v) for n, v in given.items()]

@@ -196,15 +196,24 @@ class Orders(_Sequence):
 
 
 class Times(_Sequence):
-    """Output times, ascending, the last one above zero."""
+    """Output times, ascending, the last one above zero; or the `start` alone, where it is enough.
+
+    None, if they are `optional`.
+    """
+
+    def __init__(self, *, optional: bool = False, start: bool = False) -> None:
+        self.optional, self.start = optional, start
 
     def check(self, key: str, value: Any) -> Any:
         """See `Kind`."""
+        if value is None and self.optional:
+            return None
         output = np.atleast_1d(numbers(key, value))
         if output.ndim != 1 or not output.size:
             wrong = Problem(key, "must be a list of at least one number", value)
-        elif not (np.isfinite(output).all() and output[0] >= 0 and output[-1] > 0):
-            wrong = Problem(key, "must be finite, zero or more, and end above zero", value)
+        elif not (np.isfinite(output).all() and output[0] >= 0 and (self.start or output[-1] > 0)):
+            end = "" if self.start else ", and end above zero"
+            wrong = Problem(key, f"must be finite numbers, zero or more{end}", value)
         elif (np.diff(output) <= 0).any():
             k = int(np.argmax(np.diff(output) <= 0))
             wrong = Problem(key, f"must ascend, but {output[k + 1]:g} follows {output[k]:g}")

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError, Problem
+from ..errors import Problem
 from ..goal import FEWEST, Goal, named
 from ..population import POPULATIONS
-from .kinds import Choice, Flag, Number, Orders, Registered, Text, Times, Whole, checked, setting
+from .arguments import Arguments
+from .kinds import Choice, Flag, Number, Orders, Registered, Text, Times, Whole, setting
 
 if TYPE_CHECKING:
     from ..methods.base import Method
@@ -27,7 +28,7 @@ WEIGHTING = Registered("smolux.weighting", "WEIGHTINGS", "Weighting")
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Arguments):
     """The arguments of `smolux.simulate` that decide its numbers, as it describes them."""
 
     times: tuple[float, ...] = setting(Times(), kw_only=False)
@@ -62,19 +63,37 @@ class Settings:
     )
 
     @classmethod
-    def checked(cls, given: Mapping[str, Any]) -> Settings:
-        """Check arguments, all at once.
+    def disagreements(cls, good: Mapping[str, Any]) -> list[str]:
+        """See `Arguments`."""
+        problems: list[str] = []
 
-        Raises
-        ------
-        InputError
-            With every mistake.
-        """
-        good, problems = checked(cls, given)
-        problems += disagreements(good)
-        if problems:
-            raise InputError(problems)
-        return cls(**good)
+        def known(*names: str) -> bool:
+            return all(name in good for name in names)
+
+        if known("target", "orders", "sizes"):
+            named(good["target"], good["orders"], good["sizes"], problems)
+        if good.get("weighting") == "auto" and good.get("target") == "largest":
+            problems.append(
+                Problem(
+                    "target",
+                    'with weighting = "auto" the largest of the simulated particles is another '
+                    "quantity with each weighting; name a density or a moment as target, or a "
+                    "weighting",
+                    "largest",
+                )
+            )
+        if known("subvolumes", "particles") and good["subvolumes"] > 1:
+            parts, particles = good["subvolumes"], good["particles"]
+            if particles < LEAST * parts:
+                cure = (
+                    f"each needs {LEAST} particles or more, and particles = {particles}: use fewer "
+                    "sub-volumes, or several replicas instead"
+                )
+                problems.append(Problem("subvolumes", cure, parts))
+        # what is not among the right ones was given
+        if good.get("target_error", 1.0) is not None and "replicas" in good:
+            problems += _too_few(good["replicas"], good.get("max_replicas"))
+        return problems
 
     @property
     def goal(self) -> Goal | None:
@@ -82,39 +101,6 @@ class Settings:
         if self.target_error is None:
             return None
         return Goal(self.target, self.target_error, self.replicas, self.max_replicas)
-
-
-def disagreements(good: Mapping[str, Any]) -> list[str]:
-    """Say which arguments do not go together, of those that are right by themselves."""
-    problems: list[str] = []
-
-    def known(*names: str) -> bool:
-        return all(name in good for name in names)
-
-    if known("target", "orders", "sizes"):
-        named(good["target"], good["orders"], good["sizes"], problems)
-    if good.get("weighting") == "auto" and good.get("target") == "largest":
-        problems.append(
-            Problem(
-                "target",
-                'with weighting = "auto" the largest of the simulated particles is another '
-                "quantity with each weighting; name a density or a moment as target, or a "
-                "weighting",
-                "largest",
-            )
-        )
-    if known("subvolumes", "particles") and good["subvolumes"] > 1:
-        parts, particles = good["subvolumes"], good["particles"]
-        if particles < LEAST * parts:
-            cure = (
-                f"each needs {LEAST} particles or more, and particles = {particles}: use fewer "
-                "sub-volumes, or several replicas instead"
-            )
-            problems.append(Problem("subvolumes", cure, parts))
-    # what is not among the right ones was given
-    if good.get("target_error", 1.0) is not None and "replicas" in good:
-        problems += _too_few(good["replicas"], good.get("max_replicas"))
-    return problems
 
 
 def _too_few(first: int, most: int | None) -> list[str]:

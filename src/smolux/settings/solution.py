@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..errors import InputError, Problem
-from .kinds import Choice, Flag, Number, Orders, Times, Whole, checked, setting
+from ..errors import Problem
+from ..model import Model
+from .arguments import Arguments
+from .kinds import Choice, Flag, Number, Orders, Times, Whole, setting
 from .simulation import MOST_SIZES
 
 #: how sums over pairs are taken, and what a gel does, see `smolux.solve`
@@ -19,7 +21,7 @@ OBSERVED = ("orders", "sizes", "bins_per_octave")
 
 
 @dataclass(frozen=True)
-class SolverSettings:
+class SolverSettings(Arguments):
     """The arguments of `smolux.solve` that decide its numbers, as it describes them."""
 
     times: tuple[float, ...] = setting(Times(), kw_only=False)
@@ -36,28 +38,25 @@ class SolverSettings:
     check: bool = setting(Flag(), False)
 
     @classmethod
-    def checked(cls, given: Mapping[str, Any]) -> SolverSettings:
-        """Check arguments, all at once.
+    def disagreements(cls, good: Mapping[str, Any]) -> list[str]:
+        """See `Arguments`."""
+        window, most = good.get("window"), good.get("max_window")
+        if window is None or most is None:
+            return []
+        cure = (
+            f"with max_window = {most!r}: the first fixes the number of sizes, the second limits "
+            "its growth: give one of them"
+        )
+        return [Problem("window", cure, window)]
 
-        Raises
-        ------
-        InputError
-            With every mistake.
-        """
-        good, problems = checked(cls, given)
-        problems += disagreements(good)
-        if problems:
-            raise InputError(problems)
-        return cls(**good)
-
-
-def disagreements(good: Mapping[str, Any]) -> list[str]:
-    """Say which arguments do not go together, of those that are right by themselves."""
-    window, most = good.get("window"), good.get("max_window")
-    if window is None or most is None:
-        return []
-    cure = (
-        f"with max_window = {most!r}: the first fixes the number of sizes, the second limits its "
-        "growth: give one of them"
-    )
-    return [Problem("window", cure, window)]
+    @classmethod
+    def against(cls, model: Model, given: Mapping[str, Any]) -> list[str]:
+        """See `Arguments`."""
+        if given.get("gel") != "reacts" or model.only_aggregates:
+            return []
+        others = [p.name for p in model.processes if p.name != "aggregation"]
+        cure = (
+            f"is for aggregation alone, not with {', '.join(others)}: what a gel would leave then "
+            "is not defined; use gel='inert'"
+        )
+        return [Problem("gel", cure, "reacts")]

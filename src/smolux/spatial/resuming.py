@@ -11,9 +11,10 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..progress import Progress
 from ..results import told
 from .result import system_of, trace_of
-from .running import Limits, SpatialProgress, checked, driven
+from .running import checked, driven
 from .windowed import Windowed
 
 
@@ -25,7 +26,7 @@ def resume(
     times: ArrayLike | None = None,
     max_events: int | None = None,
     time_limit: float | None = None,
-    progress: Callable[[SpatialProgress], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> xr.DataTree:
     """Let a run go on from where it stopped, by the windowed method.
 
@@ -52,15 +53,15 @@ def resume(
     -----
     The merges are those of a run without a stop, to rounding: contacts are predicted anew.
     """
-    before = trace_of(result)
+    given = dict(locals())
+    before = trace_of(given.pop("result"))
     system = system_of(result)
     method = _method_of(result)
-    _, output = checked(system, method, until, clusters, times, max_events, time_limit, progress)
+    _, settings = checked(system, method, given)
     if until is not None and until <= before.time:
         raise InputError(f"until = {until!r}: the run has reached {before.time:g} already")
     begun = partial(method.start, system, np.empty(0), before)
-    limits = Limits(until, clusters, max_events, time_limit)
-    tree = driven(system, method, begun, output, limits, progress)
+    tree = driven(system, method, begun, settings)
     tree.attrs["wall_seconds"] += float(result.attrs.get("wall_seconds", 0.0))
     return told(tree)
 

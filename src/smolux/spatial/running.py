@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import is_number, numbers
-from ..errors import InputError, Interrupted, OutOfMemoryError, did_you_mean
+from ..errors import Interrupted, OutOfMemoryError, did_you_mean
+from ..progress import Progress
 from ..room import needed
-from .ctrlc import CtrlC
+from ..settings import SpatialSettings
+from ..stopping import AtOnce, Stopper
 from .method import Run, SpatialMethod
 from .methods import METHODS
 from .playing import narrate
@@ -34,42 +34,8 @@ _TICK = 0.2
 _EVENT = 100
 
 
-@dataclass(frozen=True)
-class SpatialProgress:
-    """How far a run is.
-
-    Attributes
-    ----------
-    events : int
-        Merges and reflections so far, or steps.
-    clusters : int
-        Left.
-    time : float
-        Simulated so far.
-    fraction : float
-        Share of the merges that are wanted which is done, 0 to 1.
-    events_per_second : float
-    seconds_left : float
-        Not known: NaN.
-    compile_seconds : float
-        Until the first slice was done.
-    bounds_seconds : float
-        Always zero: nothing is bounded.
-    """
-
-    events: int
-    clusters: int
-    time: float
-    fraction: float
-    events_per_second: float
-    seconds_left: float
-    compile_seconds: float
-    bounds_seconds: float = 0.0
-
-    @property
-    def note(self) -> str:
-        """For a bar: the clusters left."""
-        return f"{self.clusters} clusters left"
+#: former name of `Progress`
+SpatialProgress = Progress
 
 
 def simulate(
@@ -81,7 +47,7 @@ def simulate(
     times: ArrayLike | None = None,
     max_events: int | None = None,
     time_limit: float | None = None,
-    progress: Callable[[SpatialProgress], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> xr.DataTree:
     """Let discs fly and stick until few clusters are left.
 
@@ -103,7 +69,7 @@ def simulate(
     time_limit : float, optional
         Stop after so many seconds of wall time.
     progress : callable, optional
-        Called with a `SpatialProgress` a few times a second.
+        Called with a `Progress` a few times a second.
 
     Returns
     -------
@@ -136,51 +102,33 @@ def simulate(
     >>> result["events"].sizes["event"]
     99
     """
+    given = dict(locals())
     from ..results import told
 
-    chosen, output = checked(
-        system, method, until, clusters, times, max_events, time_limit, progress
-    )
-    begun = partial(chosen.start, system, np.empty(0) if output is None else output)
-    limits = Limits(until, clusters, max_events, time_limit)
-    return told(driven(system, chosen, begun, output, limits, progress))
-
-
-@dataclass(frozen=True)
-class Limits:
-    """When to stop."""
-
-    until: float | None
-    clusters: int
-    max_events: int | None
-    time_limit: float | None
-
-    def numbers(self) -> tuple[float, float, float]:
-        """Return the last time, the number of events and the seconds; infinite if left out."""
-        given = (self.until, self.max_events, self.time_limit)
-        until, events, seconds = (np.inf if x is None else float(x) for x in given)
-        return until, events, seconds
+    chosen, settings = checked(given.pop("system"), given.pop("method"), given)
+    begun = partial(chosen.start, system, np.array(settings.times or ()))
+    return told(driven(system, chosen, begun, settings))
 
 
 def driven(
-    system: System, method: SpatialMethod, begun: Callable[[], Run], output: Float | None,
-    limits: Limits, progress: Any,
-) -> xr.DataTree:  # fmt: skip
+    system: System, method: SpatialMethod, begun: Callable[[], Run], settings: SpatialSettings
+) -> xr.DataTree:
     """Drive a run to its end and make the result of it."""
     started = clock.perf_counter()
     run = begun()
-    with CtrlC() as keys:
-        driver = _Driver(run, len(system), limits.clusters, started, progress, keys)
+    with Stopper() as stopper:
+        driver = _Driver(run, len(system), settings, started, stopper.check)
         try:
-            stopped = driver.drive(*limits.numbers())
+            stopped = driver.drive(*settings.limits())
+        except AtOnce:  # state and log may not agree
+            raise
         except KeyboardInterrupt:
-            if keys.impatient:
-                raise
             driver.interrupted = True
             stopped = "interrupted"
     trace = run.trace()
     trace.stopped = trace.stopped or stopped
     wall = clock.perf_counter() - started
+    output = None if settings.times is None else np.array(settings.times)
     tree = _result(system, method, trace, output, wall, driver.compile_seconds)
     if driver.interrupted:
         raise Interrupted(f"stopped with {run.clusters} clusters left", tree)
@@ -191,10 +139,11 @@ class _Driver:
     """Calls a run slice by slice."""
 
     def __init__(
-        self, run: Run, discs: int, target: int, started: float, progress: Any, keys: CtrlC
-    ) -> None:
-        self.run, self.discs, self.target = run, discs, target
-        self.started, self.progress, self.keys = started, progress, keys
+        self, run: Run, discs: int, settings: SpatialSettings, started: float,
+        check: Callable[[], None],
+    ) -> None:  # fmt: skip
+        self.run, self.discs, self.target = run, discs, settings.clusters
+        self.started, self.progress, self.check = started, settings.progress, check
         self.compile_seconds = 0.0
         self.interrupted = False
 
@@ -202,7 +151,7 @@ class _Driver:
         """Go on to the end; return why it was not the goal, or nothing."""
         told = self.started
         while (code := self._slice(until, most, limit)) is None:
-            self.keys.check()
+            self.check()
             now = clock.perf_counter()
             if now - told > _TICK:
                 told = now
@@ -239,34 +188,32 @@ class _Driver:
         speed = run.events / (clock.perf_counter() - self.started)
         done = min((self.discs - run.clusters) / wanted, 1.0)
         self.progress(
-            SpatialProgress(
-                run.events, run.clusters, run.time, done, speed, np.nan, self.compile_seconds
+            Progress(
+                done,
+                "simulating",
+                run.events,
+                events_per_second=speed,
+                compile_seconds=self.compile_seconds,
+                note=f"{run.clusters} clusters left",
+                counts={"clusters": run.clusters, "time": run.time},
             )
-        )  # fmt: skip
+        )
 
 
 def checked(
-    system: Any, method: Any, until: Any, clusters: Any, times: Any, max_events: Any,
-    time_limit: Any, progress: Any,
-) -> tuple[SpatialMethod, Float | None]:  # fmt: skip
-    """Return the method and the output times, or raise an `InputError` with every mistake."""
+    system: Any, method: Any, given: Mapping[str, Any]
+) -> tuple[SpatialMethod, SpatialSettings]:
+    """Return the method and the other arguments, or raise an `InputError` with every mistake."""
     problems: list[str] = []
     if not isinstance(system, System):
         problems.append(
             f"system = {system!r}: must be a smolux.spatial.System, or made by lattice or random"
         )
     chosen = _method(method, problems)
-    for name, value in (("until", until), ("time_limit", time_limit), ("max_events", max_events)):
-        if value is not None and not (_number(value) and value > 0):
-            problems.append(f"{name} = {value!r}: must be a positive number, or left out")
-    if not (_number(clusters) and clusters == int(clusters) and clusters >= 1):
-        problems.append(f"clusters = {clusters!r}: must be a whole number, one or more")
-    if progress is not None and not callable(progress):
-        problems.append(f"progress = {progress!r}: must be a function of a SpatialProgress")
-    output = _times(times, chosen, problems)
-    if problems:
-        raise InputError(problems)
-    return chosen, output
+    steps = isinstance(chosen, SpatialMethod) and not chosen.exact
+    if steps and given.get("times") is None:
+        problems.append(f"times: the method {chosen.name!r} takes steps; say when to observe")
+    return chosen, SpatialSettings.checked(given, problems)
 
 
 def _method(method: Any, problems: list[str]) -> Any:
@@ -279,28 +226,6 @@ def _method(method: Any, problems: list[str]) -> Any:
     elif not isinstance(method, SpatialMethod):
         problems.append(f"method = {method!r}: must be a name or one of smolux.spatial.METHODS")
     return method
-
-
-def _times(times: Any, method: Any, problems: list[str]) -> Float | None:
-    if times is None:
-        if isinstance(method, SpatialMethod) and not method.exact:
-            problems.append(f"times: the method {method.name!r} takes steps; say when to observe")
-        return None
-    try:
-        output = np.atleast_1d(numbers("times", times))
-    except InputError as error:
-        problems += error.problems
-        return None
-    if not (output.ndim == 1 and (np.isfinite(output) & (output >= 0)).all()):
-        problems.append(f"times = {times!r}: must be finite numbers, zero or more")
-        return None
-    if (np.diff(output) <= 0).any():
-        problems.append(f"times = {times!r}: must ascend")
-    return output
-
-
-def _number(value: Any) -> bool:
-    return is_number(value) and bool(np.isfinite(value))
 
 
 def _default_times(trace: Trace) -> Float:

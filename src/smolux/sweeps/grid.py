@@ -7,7 +7,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from ..analysis.gathering import gather
 from ..case import Case
 from ..errors import InputError, Interrupted, quiet
 from ..executors import adapted, completed, opened
+from ..progress import Progress
 from ..resources import available_memory
 from .over import read_axes
 from .points import Folder, Point, Sweep, make_sweep
@@ -30,36 +31,8 @@ _TICK = 0.2
 _MEMORY = 0.5
 
 
-@dataclass(frozen=True)
-class SweepProgress:
-    """How far a sweep is.
-
-    Attributes
-    ----------
-    points, done, failed : int
-        All points; those that are finished, the failed ones included; the failed ones.
-    fraction : float
-        Share of the points that is done, a part of the present one included.
-    events : int
-        Collisions since the sweep was started or gone on with.
-    events_per_second, seconds_left, compile_seconds, bounds_seconds : float
-    """
-
-    points: int
-    done: int
-    failed: int
-    fraction: float
-    events: int
-    events_per_second: float
-    seconds_left: float
-    compile_seconds: float
-    bounds_seconds: float = 0.0
-
-    @property
-    def note(self) -> str:
-        """The points in words."""
-        failed = f", {self.failed} failed" if self.failed else ""
-        return f"{self.done} of {self.points} points{failed}"
+#: former name of `Progress`
+SweepProgress = Progress
 
 
 def sweep(
@@ -69,7 +42,7 @@ def sweep(
     directory: str | os.PathLike[str],
     sets: Sequence[str] = (),
     executor: Executor | None = None,
-    progress: Callable[[SweepProgress], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> xr.Dataset:
     """Run a case at every point of a grid of its parameters.
 
@@ -93,7 +66,7 @@ def sweep(
         out, what ``[parallel]`` of the case says: without it the points come one after the other,
         the replicas of each on threads.
     progress : callable, optional
-        Called with a `SweepProgress` a few times a second.
+        Called with a `Progress` a few times a second.
 
     Returns
     -------
@@ -131,7 +104,7 @@ def go_on(
     directory: str | os.PathLike[str],
     *,
     executor: Executor | None = None,
-    progress: Callable[[SweepProgress], None] | None = None,
+    progress: Callable[[Progress], None] | None = None,
 ) -> xr.Dataset:
     """Go on with the sweep in a folder; see `sweep`."""
     folder = Folder(Path(directory).expanduser())
@@ -168,7 +141,7 @@ class _Running:
         folder: Folder,
         plan: Sweep,
         executor: Executor | None,
-        progress: Callable[[SweepProgress], None] | None,
+        progress: Callable[[Progress], None] | None,
     ) -> None:
         self.folder, self.plan, self.progress = folder, plan, progress
         self.executor = adapted(executor)
@@ -260,13 +233,20 @@ class _Running:
         spent = time.perf_counter() - self.started
         here = self.done - self.begun_with + part
         left = spent / here * (points - self.done - part) if here > 0 else math.nan
+        failed = f", {len(self.failures)} failed" if self.failures else ""
         self.progress(
-            SweepProgress(
-                points, self.done, len(self.failures), min((self.done + part) / points, 1.0),
-                self.events, self.events / spent if spent > 0 else 0.0, left, self.compile_seconds,
-                self.bounds_seconds,
+            Progress(
+                min((self.done + part) / points, 1.0),
+                "sweeping",
+                self.events,
+                events_per_second=self.events / spent if spent > 0 else 0.0,
+                seconds_left=left,
+                compile_seconds=self.compile_seconds,
+                bounds_seconds=self.bounds_seconds,
+                note=f"{self.done} of {points} points{failed}",
+                counts={"points": points, "done": self.done, "failed": len(self.failures)},
             )
-        )  # fmt: skip
+        )
 
     def _gathered(self) -> xr.Dataset:
         found: list[xr.Dataset | None] = []

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import is_number
-from ..errors import InputError
+from ..errors import InputError, Problem
 from ..intervals import Interval
 from ..kernels.base import Kernel
 from ..kernels.majorant import Majorant
@@ -75,10 +75,9 @@ class WeightFunction(Weighting):
         given = self.w
         if is_number(given):
             if not abs(float(given)) <= STEEPEST:
-                raise InputError(
-                    f"weight function = {given!r}: the power of the size must be a number from "
-                    f"-{STEEPEST:g} to {STEEPEST:g}"
-                )
+                limits = f"must be a number from -{STEEPEST:g} to {STEEPEST:g}"
+                what = "weight function"
+                raise InputError([Problem(what, f"the power of the size {limits}", given)])
             object.__setattr__(self, "w", float(given))
             return
         if not (isinstance(given, str) or callable(given)):
