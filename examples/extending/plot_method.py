@@ -4,7 +4,7 @@ A method of your own
 
 How the next event is found, and how particles are held for that, is a method. This is the oldest
 one, which sums the rates of all pairs at each event: slow, and hard to get wrong. For single
-particles, sources, weightings, doubling and sub-volumes it needs nothing more.
+particles, sources, weightings and doubling it needs nothing more.
 """
 
 import math

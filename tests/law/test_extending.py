@@ -68,8 +68,7 @@ def test_a_method_of_ones_own_waits_as_others_do() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("subvolumes", [1, 2])
-def test_a_method_of_ones_own_with_other_processes(subvolumes: int) -> None:
+def test_a_method_of_ones_own_with_other_processes() -> None:
     """Against the rate equations, with particles that come, leave and shed others."""
     processes = [
         sx.processes.Aggregation(), OWN["Shedding"](0.3), sx.processes.Removal("0.1*k"),
@@ -79,7 +78,6 @@ def test_a_method_of_ones_own_with_other_processes(subvolumes: int) -> None:
     replicas, time = 60, 0.5
     ds = sx.simulate(
         model, [time], method=DIRECT, particles=120, replicas=replicas, seed=5, sizes=12,
-        subvolumes=subvolumes, remix=0.1 if subvolumes > 1 else None,
     )  # fmt: skip
     exact = sx.solve(model, [time])
     for order in (0, 1, 2):
