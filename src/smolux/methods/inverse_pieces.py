@@ -175,7 +175,7 @@ def _make_room(own_rate: Any) -> Any:
         for k in range(old, top_of(s, w)):
             w.rate[0, k] = own_rate(s, w, np.int64(k + 1), -1, p)
 
-    @cold_piece
+    @piece
     def room(s, w, gone, entries, p):
         buckets = w.table.shape[1]
         needed = 0
@@ -231,7 +231,7 @@ def _make_put(pair_rate: Any, row_of: Any, own_rate: Any, look: Any) -> Any:
         for d in range(first, first + count):
             w.large_rate[d] = own
 
-    @cold_piece
+    @piece
     def put(s, w, size, count, i, j, p):
         # of both; half of either if it is one
         share = 1.0 if j > 0 else 0.5 if i > 0 else 0.0
