@@ -49,6 +49,31 @@ def _as_float(rate: Callable[..., Any]) -> Any:
 
 
 @lru_cache(maxsize=64)
+def _one_of(rates: tuple[Callable[..., Any], ...], compiled: Callable[..., Any]) -> Any:
+    """Bind functions into one of their number, of `x` and a tuple of the q of each.
+
+    Each is ``compiled(rate)(x, *q)``.
+    """
+    first = compiled(rates[0])
+    if len(rates) == 1:
+
+        @piece
+        def last(r, x, q):
+            return float(first(x, *q[0]))
+
+        return last
+    others = _one_of(rates[1:], compiled)
+
+    @piece
+    def one_of(r, x, q):
+        if r == 0:
+            return float(first(x, *q[0]))
+        return others(r - 1, x, q[1:])
+
+    return one_of
+
+
+@lru_cache(maxsize=64)
 def _outcome(kind: Any) -> Any:
     """Bind ``outcome(i, j, s, q)`` of one process, `q` being its own parameters."""
     if kind.random:
@@ -100,55 +125,25 @@ def _outcomes(kinds: tuple[Any, ...]) -> Any:
     return outcome
 
 
-@lru_cache(maxsize=64)
 def _factors(rates: tuple[Callable[..., Any], ...]) -> Any:
     """Bind the factors into one; `q` holds a tuple of parameters for each; 0 without any."""
-    if not rates:
+    if rates:
+        return _one_of(rates, user_piece)
+    return _nothing
 
-        @piece
-        def none(r, t, q):
-            return 0.0
 
-        return none
-    first = user_piece(rates[0])
-    if len(rates) == 1:
-
-        @piece
-        def last(r, t, q):
-            return float(first(t, *q[0]))
-
-        return last
-    others = _factors(rates[1:])
-
-    @piece
-    def factor(r, t, q):
-        if r == 0:
-            return float(first(t, *q[0]))
-        return others(r - 1, t, q[1:])
-
-    return factor
+@piece
+def _nothing(r, t, q):
+    return 0.0
 
 
 @lru_cache(maxsize=64)
-def _shares(rates: tuple[Callable[..., Any], ...]) -> Any:
-    """Bind the shares of encounters into one function, as `_factors` does; None without any."""
-    if not rates:
-        return None
-    first = _as_float(rates[0])
-    others = _shares(rates[1:])
-    if others is None:
-
-        @piece
-        def last(r, i, j, q):
-            return first(float(i), float(j), *q[0])
-
-        return last
+def _share(rate: Callable[..., Any]) -> Any:
+    inner = user_piece(rate)
 
     @piece
-    def share(r, i, j, q):
-        if r == 0:
-            return first(float(i), float(j), *q[0])
-        return others(r - 1, i, j, q[1:])
+    def share(pair, *q):
+        return inner(float(pair[0]), float(pair[1]), *q)
 
     return share
 
@@ -231,7 +226,8 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
         outcome, tally = make_outcome(outcome, weight), make_tally(weight)
     pieces = method.bind(simulated, tally)
     random = weight is not None or any(type(p).random for p in pairs)
-    share = _shares(tuple(law.rate for law in _share_laws(pairs)))
+    shares = tuple(law.rate for law in _share_laws(pairs))
+    share = _one_of(shares, _share) if shares else None
     encounters = make_encounters(pieces.pair, outcome, factor, len(pairs), share)
     if not lone and not sources:
         fire = make_fire(encounters, pieces.update, random)

@@ -95,7 +95,7 @@ def make_choose_process(
     """Bind the choice of the process of an encounter, of the first `pairs` ones.
 
     ``factor(r, t, q)`` is the rate of process `r` as a multiple of the kernel, `pair` that of the
-    method, and ``share(r, i, j, q)`` the share of the encounters of two sizes in which process `r`
+    method, and ``share(r, (i, j), q)`` the share of the encounters of two sizes in which process `r`
     takes place; None if that is all of them.
     """
     if pair is not None and share is not None:
@@ -108,7 +108,7 @@ def make_choose_process(
             if r < 0:
                 return r
             i, j = pair(s, w)
-            value = share(r, i, j, q.shares)
+            value = share(r, (i, j), q.shares)
             if not 0.0 <= value <= ROUNDING:
                 note_bad(s, i, j, value)
                 s.count[PROCESS] = r
