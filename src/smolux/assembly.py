@@ -148,6 +148,54 @@ def _share(rate: Callable[..., Any]) -> Any:
     return share
 
 
+@lru_cache(maxsize=64)
+def _mixture(terms: tuple[tuple[Callable[..., Any], Callable[..., Any]], ...]) -> Any:
+    """Bind what a kernel that varies is at a time, as a multiple of what it is without factors.
+
+    Of each term the factor and the rate are given, and `q` holds a tuple of parameters for each of
+    both.
+    """
+    if len(terms) == 1:
+        factor = user_piece(terms[0][0])
+
+        @piece
+        def common(i, j, t, q):
+            return float(factor(t, *q[0][0]))
+
+        return common
+    added = _added(terms)
+
+    @piece
+    def mixture(i, j, t, q):
+        varied, whole = added(float(i), float(j), t, q)
+        return varied / whole if whole > 0.0 else 0.0
+
+    return mixture
+
+
+@lru_cache(maxsize=64)
+def _added(terms: tuple[tuple[Callable[..., Any], Callable[..., Any]], ...]) -> Any:
+    """Bind the sums of terms, with and without the factor of each."""
+    factor, rate = user_piece(terms[0][0]), _as_float(terms[0][1])
+    if len(terms) == 1:
+
+        @piece
+        def last(i, j, t, q):
+            value = rate(i, j, *q[0][1])
+            return factor(t, *q[0][0]) * value, value
+
+        return last
+    others = _added(terms[1:])
+
+    @piece
+    def added(i, j, t, q):
+        value = rate(i, j, *q[0][1])
+        varied, whole = others(i, j, t, q[1:])
+        return factor(t, *q[0][0]) * value + varied, value + whole
+
+    return added
+
+
 def _share_laws(pairs: Sequence[PairProcess]) -> list[Kernel]:
     """Return the shares of encounters in which processes take place; none if those are all."""
     laws = [p.shared for p in pairs]
@@ -176,8 +224,10 @@ def _key(model: Model, method: Method, weighting: Weighting) -> tuple[Any, ...]:
     functions += [p.law for p in lone]
     functions += [p.factor.rate for p in model.processes]
     functions += [law.rate for law in _share_laws(pairs)]
+    functions += [law.rate for term in model.kernel.in_time for law in term]
     shape = len(model.kernel.parameters), len(weighted), len(pairs), len(lone), len(sources)
-    return (type(method), *shape, *((type(p), p.splits) for p in lone), *map(digest, functions))
+    kinds = type(method), len(model.kernel.in_time), *((type(p), p.splits) for p in lone)
+    return (*kinds, *shape, *map(digest, functions))
 
 
 def uncompilable(model: Model, weighting: Weighting) -> list[str]:
@@ -185,6 +235,10 @@ def uncompilable(model: Model, weighting: Weighting) -> list[str]:
     _, lone, _ = _kinds(model)
     given: list[tuple[str, Callable[..., Any], int]] = [
         *((f"the kernel {k.label}", k.rate, 2 + len(k.parameters)) for _, k in model.kernel.parts),
+        *(
+            (f"the factor of the kernel in time, {f.text}", f.rate, 1 + len(f.arguments))
+            for f, _ in model.kernel.in_time
+        ),
         *((f"the rate of {p.called}", p.law, 2 if p.splits else 1) for p in lone),
         *((f"the rate of {p.called} in time", p.factor.rate, 1) for p in model.processes),
         *(
@@ -228,11 +282,13 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
     random = weight is not None or any(type(p).random for p in pairs)
     shares = tuple(law.rate for law in _share_laws(pairs))
     share = _one_of(shares, _share) if shares else None
-    encounters = make_encounters(pieces.pair, outcome, factor, len(pairs), share)
+    terms = tuple((f.rate, law.rate) for f, law in model.kernel.in_time)
+    mixture = _mixture(terms) if terms else None
+    encounters = make_encounters(pieces.pair, outcome, factor, len(pairs), share, mixture)
     if not lone and not sources:
         fire = make_fire(encounters, pieces.update, random)
         burst = None
-        if pieces.burst is not None and share is None:
+        if pieces.burst is not None and share is None and mixture is None:
             burst = make_burst(pieces.burst, outcome, len(pairs), random)
         next_event = make_next_event(pieces.draw, burst)
         return make_loop(make_advance(pieces, next_event, fire), pieces.view)
@@ -275,8 +331,12 @@ def rates_for(model: Model, weighting: Weighting) -> Rates:
     )
 
 
-def factor_parameters(processes: Sequence[Process]) -> Parameters:
-    """Return the parameters of the processes, as the loop takes them, with tables to be filled."""
+def factor_parameters(processes: Sequence[Process], kernel: Kernel | None = None) -> Parameters:
+    """Return the parameters of the processes, as the loop takes them, with tables to be filled.
+
+    And those of the terms of a kernel that varies.
+    """
+    terms = () if kernel is None else kernel.in_time
     pairs = [p for p in processes if isinstance(p, PairProcess)]
     lone = [p for p in processes if isinstance(p, LoneProcess)]
     return Parameters(
@@ -289,6 +349,7 @@ def factor_parameters(processes: Sequence[Process]) -> Parameters:
         ),
         tuple(p.factor.parameters for p in lone),
         tuple(p.factor.parameters for p in processes if isinstance(p, Source)),
+        tuple((factor.parameters, law.parameters) for factor, law in terms),
     )
 
 

@@ -39,6 +39,7 @@ ARGUMENTS: dict[str, Dimension] = {
     "density_difference": units.MASS_DENSITY,
 }
 
+_IN_TIME = 'a number or a formula in t such as "0.01*(1 - t/400)"'
 _INITIALS = {i.name: i for i in INITIALS}
 
 
@@ -91,6 +92,17 @@ def build(physics: Physics, si: bool, problems: Problems) -> Model | None:
 
 
 def _kernel(table: Table) -> tuple[dict[str, Any], str]:
+    """Read a law, which a function of time may multiply; from which quantities, or nothing."""
+    varying = table.take("varying")
+    known = isinstance(varying, (int, float, str)) and not isinstance(varying, bool)
+    if "varying" in table and not known:
+        table.bad("varying", f"must be {_IN_TIME}")
+    table.content.pop("varying", None)
+    data, origin = _law(table)
+    return ({**data, "varying": varying} if known else data), origin
+
+
+def _law(table: Table) -> tuple[dict[str, Any], str]:
     laws = {k.name: k for k in KERNELS if k.name != "formula"}
     if "terms" in table:
         return _sum(table)
@@ -262,7 +274,7 @@ def _of_process(kind: type[Process], key: str) -> str:
         return 'a text such as "wall"'
     variable = getattr(kind, "variables", {"rate": "t"}).get(key)
     if variable == "t":
-        return 'a number or a formula in t such as "0.01*(1 - t/400)"'
+        return _IN_TIME
     if variable == "k":
         return 'a number, a formula in k such as "k**(2/3)", or a list of values for k = 1, 2, ...'
     if variable is not None:

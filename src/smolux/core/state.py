@@ -214,6 +214,8 @@ class Parameters(NamedTuple):
     lone, lone_factors : tuple
         Of single particles: of the rates, see `smolux.core.lone.Law`, and of the factors.
     source_factors : tuple
+    mixture : tuple
+        For each term of a kernel that varies, of its factor and of its rate.
     """
 
     factors: tuple[Any, ...]
@@ -222,6 +224,7 @@ class Parameters(NamedTuple):
     lone: tuple[Any, ...]
     lone_factors: tuple[Any, ...]
     source_factors: tuple[Any, ...]
+    mixture: tuple[Any, ...]
 
 
 class Tally(NamedTuple):

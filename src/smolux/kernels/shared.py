@@ -16,6 +16,7 @@ from smolux.checks import is_number
 from smolux.content import frozen
 from smolux.errors import InputError
 from smolux.intervals import Interval
+from smolux.timefunction import TimeFunction
 
 from .base import Kernel, widen
 from .check import sample_sizes
@@ -114,6 +115,11 @@ class Shared(MadeOfKernels):
     def made_of(self) -> tuple[Kernel, ...]:
         """See `MadeOfKernels`."""
         return self.kernel, self.share
+
+    @property
+    def in_time(self) -> tuple[tuple[TimeFunction, Kernel], ...]:
+        """See `Kernel.in_time`; each law times the share."""
+        return tuple((factor, Shared(law, self.share)) for factor, law in self.kernel.in_time)
 
     @property
     def label(self) -> str:

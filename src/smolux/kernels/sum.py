@@ -14,10 +14,12 @@ from smolux.checks import is_number
 from smolux.content import frozen
 from smolux.errors import InputError
 from smolux.intervals import Interval
+from smolux.timefunction import TimeFunction
 
 from .base import Float, Kernel
 from .made import MadeOfKernels
 from .majorant import Majorant
+from .varying import ONE
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,20 @@ class Sum(MadeOfKernels):
     def parts(self) -> tuple[tuple[float, Kernel], ...]:
         """See `Kernel.parts`."""
         return tuple(zip(self.coefficients, self.terms, strict=True))
+
+    @property
+    def in_time(self) -> tuple[tuple[TimeFunction, Kernel], ...]:
+        """See `Kernel.in_time`; terms with the same factor are one law."""
+        by_factor: dict[TimeFunction, list[tuple[float, Kernel]]] = {}
+        for number, kernel in self.parts:
+            ((factor, plain),) = kernel.in_time or ((ONE, kernel),)
+            by_factor.setdefault(factor, []).append((number, plain))
+        if list(by_factor) == [ONE]:
+            return ()
+        return tuple(
+            (factor, Sum(tuple(k for _, k in terms), tuple(c for c, _ in terms)))
+            for factor, terms in by_factor.items()
+        )
 
     @property
     def made_of(self) -> tuple[Kernel, ...]:
