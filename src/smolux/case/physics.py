@@ -27,18 +27,6 @@ FIELDS: dict[tuple[str, str], Dimension] = {
     ("initial", "densities"): units.NUMBER_DENSITY,
 }
 
-#: what the arguments of physical constructors measure, by their names
-ARGUMENTS: dict[str, Dimension] = {
-    "temperature": units.TEMPERATURE,
-    "viscosity": units.VISCOSITY,
-    "gradient": units.RATE,
-    "gravity": units.ACCELERATION,
-    "radius": units.LENGTH,
-    "volume": units.VOLUME,
-    "density": units.MASS_DENSITY,
-    "density_difference": units.MASS_DENSITY,
-}
-
 _IN_TIME = 'a number or a formula in t such as "0.01*(1 - t/400)"'
 _INITIALS = {i.name: i for i in INITIALS}
 
@@ -180,8 +168,9 @@ def _constructed(table: Table, law: type[Kernel], constructor: str) -> tuple[dic
     table.known.append("name")
     given: dict[str, float] = {}
     before = len(table.problems.messages)
+    measured = units.of_arguments(make)
     for key, argument in _signature(law, constructor).items():
-        dimension = ARGUMENTS.get(key)
+        dimension = measured.get(key)
         if key not in table:
             table.known.append(key)
             if argument.default is argument.empty:
