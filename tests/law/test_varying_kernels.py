@@ -9,13 +9,17 @@ from tests.shared import FORMULA, QUICK, extinction
 
 import smolux as sx
 from smolux import case as cases
+from smolux import checkpoint as checkpoints
 from smolux.analysis.reference import model_of
+from smolux.cli.estimate import negative_rates
 from smolux.deterministic.steady import steady_state
 from smolux.errors import InputError
 from smolux.exact import finite
 from smolux.exact.find import solution
 from smolux.kernels import Sum, from_dict
 from smolux.methods.auto import unforeseen
+from smolux.planning import make_plan
+from smolux.replicas import Group
 from smolux.windows import windows_for
 
 P = sx.processes
@@ -112,6 +116,14 @@ def test_two_terms_that_together_are_one(gel):
     np.testing.assert_allclose(ds["n"], sx.solve(plain, [4.0], tolerance=1e-9)["n"], atol=1e-9)
 
 
+@pytest.mark.filterwarnings("default:from t = .* on mass lies beyond:smolux.errors.SmoluxWarning")
+def test_a_gel_reacts_by_every_term():
+    two = sx.kernels.Multiplicative() * "exp(-t)" + 0.5 * sx.kernels.formula("2*i*j") * "1-exp(-t)"
+    given = {"times": [0.5, 3.0], "gel": "reacts", "orders": [0, 1], "window": 500}
+    ds, plain = (sx.solve(sx.Model(k), **given) for k in (two, sx.kernels.Multiplicative()))
+    np.testing.assert_allclose(ds["moment"], plain["moment"], rtol=1e-6)
+
+
 def test_a_common_factor_is_that_of_aggregation():
     times = [0.1, 0.4]
     both = sx.kernels.Constant() * "1 + t" + 2 * (sx.kernels.Additive() * "1 + t")
@@ -156,6 +168,32 @@ def test_beside_other_processes_and_with_shares():
     events = ds["events"] / ds["volume"]
     error = events.std("replica", ddof=1) / 40**0.5
     assert (np.abs(events.mean("replica") - expected["events"][0])[:, 0] < 4 * error[:, 0]).all()
+
+
+@pytest.mark.slow
+def test_sub_volumes():
+    """Each has the rates of the whole; how long until they mix is estimated from the start."""
+    given = {"method": QUICK[1], "particles": 2000, "replicas": 40, "subvolumes": 2, "seed": 6}
+    ds = sx.simulate(model(), [0.5, 1.0], **given)
+    assert (deviation(ds, sx.solve(model(), [0.5, 1.0]), order=[0, 2]) < 4).all()
+
+
+def test_a_run_goes_on_from_its_checkpoint(tmp_path):
+    plan = make_plan(
+        model(), [0.2, 1.0], method=QUICK[1], weighting="number", particles=150, replicas=2, seed=5
+    )
+    whole, part = (Group.start(plan, 0, 2) for _ in range(2))
+    part._call(part.codes, 100)
+    part._serve()
+    assert not part.done
+    checkpoints.save(tmp_path / "run.npz", plan, [part])
+    (again,) = checkpoints.load(tmp_path / "run.npz", model())[1]
+    for group in (whole, again):
+        while not group.done:
+            group._call(group.codes, 1000)
+            group._serve()
+    for one, two in zip(whole.state, again.state, strict=True):
+        np.testing.assert_array_equal(one, two)
 
 
 def test_windows_bound_the_largest_term():
@@ -220,6 +258,9 @@ def test_a_factor_that_turns_negative_ends_before_a_run():
         sx.simulate(bad, [2.0], method=QUICK[1], particles=100, replicas=1)
     with pytest.raises(InputError, match="1 - t"):
         sx.solve(bad, [2.0])
+    case = cases.parse(CASE.replace("1 + 0.1*t", "1 - 2*t"))
+    (told,) = negative_rates(case)
+    assert "the rate of aggregation, 1 - 2*t, is -" in told
 
 
 CASE = """
