@@ -83,7 +83,7 @@ class Kernel:
     def in_time(self) -> tuple[tuple[TimeFunction, Kernel], ...]:
         """Laws that do not vary, each after what multiplies it in time; none if nothing does.
 
-        They add up to the law itself, which is that where all these functions are one.
+        These laws add up to this one, which as a function of two sizes has all factors one.
         """
         return ()
 
@@ -207,7 +207,11 @@ class Kernel:
     __radd__ = __add__  # of sum(kernels), which begins with 0
 
     def __mul__(self, number: Any) -> Kernel:
-        """Multiply the rates by a positive number, or by a function of time, see `Varying`."""
+        """Multiply the rates by a positive number, or by a function of time.
+
+        That is a formula in t such as ``"1 + 0.1*t"``, a Python function, or one with what is known
+        of it, see `smolux.law`.
+        """
         from .sum import Sum
         from .varying import varied
 

@@ -26,8 +26,10 @@ from .varying import ONE
 class Sum(MadeOfKernels):
     """Several mechanisms at once: ``K(i, j) = sum_r c_r K_r(i, j)``.
 
-    Made by ``+`` and ``*``: ``kernels.Brownian.continuum(...) + 0.5 * kernels.Shear(...)``. That
-    rates add is exact for mechanisms that do not change each other, and an approximation for
+    Made by ``+`` and ``*``: ``kernels.Brownian.continuum(...) + 0.5 * kernels.Shear(...)``. Terms
+    may be multiplied by functions of time, too: ``kernels.Shear(...) * "exp(-t)"``.
+
+    That rates add is exact for mechanisms that do not change each other, and an approximation for
     others, such as Brownian motion and a flow (M. Elimelech, J. Gregory, X. Jia and R. Williams,
     Particle Deposition and Aggregation, Butterworth-Heinemann 1995, section 6.6).
 
