@@ -116,6 +116,16 @@ def test_two_terms_that_together_are_one(gel):
     np.testing.assert_allclose(ds["n"], sx.solve(plain, [4.0], tolerance=1e-9)["n"], atol=1e-9)
 
 
+def flash(t):
+    """A short one, which steps in time would pass."""
+    return 1000.0 if 30 < t < 30.001 else 0.0
+
+
+def test_the_rate_equations_see_a_short_factor():
+    ds = sx.solve(sx.Model(sx.kernels.Constant() * flash), [100.0])
+    assert float(ds["number_density"][0, 0]) == pytest.approx(1 / (1 + 0.5), rel=1e-7)
+
+
 @pytest.mark.filterwarnings("default:from t = .* on mass lies beyond:smolux.errors.SmoluxWarning")
 def test_a_gel_reacts_by_every_term():
     two = sx.kernels.Multiplicative() * "exp(-t)" + 0.5 * sx.kernels.formula("2*i*j") * "1-exp(-t)"
