@@ -337,10 +337,11 @@ def factor_parameters(processes: Sequence[Process], kernel: Kernel | None = None
     And those of the terms of a kernel that varies.
     """
     terms = () if kernel is None else kernel.in_time
+    mixture = tuple((factor.parameters, law.parameters) for factor, law in terms)
     pairs = [p for p in processes if isinstance(p, PairProcess)]
     lone = [p for p in processes if isinstance(p, LoneProcess)]
     return Parameters(
-        tuple(p.factor.parameters for p in pairs or [Aggregation()]),
+        (*(p.factor.parameters for p in pairs or [Aggregation()]), *((mixture,) if terms else ())),
         tuple(p.parameters for p in pairs or [Aggregation()]),
         tuple(law.parameters for law in _share_laws(pairs)),
         tuple(
@@ -349,7 +350,6 @@ def factor_parameters(processes: Sequence[Process], kernel: Kernel | None = None
         ),
         tuple(p.factor.parameters for p in lone),
         tuple(p.factor.parameters for p in processes if isinstance(p, Source)),
-        tuple((factor.parameters, law.parameters) for factor, law in terms),
     )
 
 

@@ -210,12 +210,11 @@ class Parameters(NamedTuple):
     ----------
     factors, outcomes, shares : tuple
         Of pairs: of the factors in time, of what comes of an encounter, and of the share of them
-        in which it does, if any of these is not one.
+        in which it does, if any of these is not one. Of a kernel that varies `factors` has one more
+        entry: for each term of it those of its factor and of its rate.
     lone, lone_factors : tuple
         Of single particles: of the rates, see `smolux.core.lone.Law`, and of the factors.
     source_factors : tuple
-    mixture : tuple
-        For each term of a kernel that varies, of its factor and of its rate.
     """
 
     factors: tuple[Any, ...]
@@ -224,7 +223,6 @@ class Parameters(NamedTuple):
     lone: tuple[Any, ...]
     lone_factors: tuple[Any, ...]
     source_factors: tuple[Any, ...]
-    mixture: tuple[Any, ...]
 
 
 class Tally(NamedTuple):
