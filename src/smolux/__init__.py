@@ -21,7 +21,7 @@ _LAZY = {
     "ensemble": "smolux.ensembles",
     "efficiency": "smolux.ensembles",
     "summary": "smolux.analysis",
-    "law": "smolux.laws",
+    "law": "smolux.stated",
     "InputError": "smolux.errors",
     "WorkerError": "smolux.errors",
     "Interrupted": "smolux.errors",
@@ -105,9 +105,9 @@ if TYPE_CHECKING:
     from .ensembles.efficiency import efficiency
     from .ensembles.ensemble import ensemble
     from .errors import InputError, Interrupted, SmoluxWarning, WorkerError
-    from .laws import law
     from .model import Model
     from .progress import Progress
+    from .stated import law
     from .stochastic import resume, simulate
     from .sweeps import sweep
 

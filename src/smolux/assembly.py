@@ -49,6 +49,31 @@ def _as_float(rate: Callable[..., Any]) -> Any:
 
 
 @lru_cache(maxsize=64)
+def _one_of(rates: tuple[Callable[..., Any], ...], compiled: Callable[..., Any]) -> Any:
+    """Bind functions into one of their number, of `x` and a tuple of the q of each.
+
+    Each is ``compiled(rate)(x, *q)``.
+    """
+    first = compiled(rates[0])
+    if len(rates) == 1:
+
+        @piece
+        def last(r, x, q):
+            return float(first(x, *q[0]))
+
+        return last
+    others = _one_of(rates[1:], compiled)
+
+    @piece
+    def one_of(r, x, q):
+        if r == 0:
+            return float(first(x, *q[0]))
+        return others(r - 1, x, q[1:])
+
+    return one_of
+
+
+@lru_cache(maxsize=64)
 def _outcome(kind: Any) -> Any:
     """Bind ``outcome(i, j, s, q)`` of one process, `q` being its own parameters."""
     if kind.random:
@@ -100,57 +125,75 @@ def _outcomes(kinds: tuple[Any, ...]) -> Any:
     return outcome
 
 
-@lru_cache(maxsize=64)
 def _factors(rates: tuple[Callable[..., Any], ...]) -> Any:
     """Bind the factors into one; `q` holds a tuple of parameters for each; 0 without any."""
-    if not rates:
+    if rates:
+        return _one_of(rates, user_piece)
+    return _nothing
 
-        @piece
-        def none(r, t, q):
-            return 0.0
 
-        return none
-    first = user_piece(rates[0])
-    if len(rates) == 1:
-
-        @piece
-        def last(r, t, q):
-            return float(first(t, *q[0]))
-
-        return last
-    others = _factors(rates[1:])
-
-    @piece
-    def factor(r, t, q):
-        if r == 0:
-            return float(first(t, *q[0]))
-        return others(r - 1, t, q[1:])
-
-    return factor
+@piece
+def _nothing(r, t, q):
+    return 0.0
 
 
 @lru_cache(maxsize=64)
-def _shares(rates: tuple[Callable[..., Any], ...]) -> Any:
-    """Bind the shares of encounters into one function, as `_factors` does; None without any."""
-    if not rates:
-        return None
-    first = _as_float(rates[0])
-    others = _shares(rates[1:])
-    if others is None:
-
-        @piece
-        def last(r, i, j, q):
-            return first(float(i), float(j), *q[0])
-
-        return last
+def _share(rate: Callable[..., Any]) -> Any:
+    inner = user_piece(rate)
 
     @piece
-    def share(r, i, j, q):
-        if r == 0:
-            return first(float(i), float(j), *q[0])
-        return others(r - 1, i, j, q[1:])
+    def share(pair, *q):
+        return inner(float(pair[0]), float(pair[1]), *q)
 
     return share
+
+
+@lru_cache(maxsize=64)
+def _mixture(terms: tuple[tuple[Callable[..., Any], Callable[..., Any]], ...]) -> Any:
+    """Bind what a kernel that varies is at a time, as a multiple of what it is without factors.
+
+    Of each term the factor and the rate are given, and `q` holds a tuple of parameters for each of
+    both.
+    """
+    if len(terms) == 1:
+        factor = user_piece(terms[0][0])
+
+        @piece
+        def common(i, j, t, q):
+            return float(factor(t, *q[0][0]))
+
+        return common
+    added = _added(terms)
+
+    @piece
+    def mixture(i, j, t, q):
+        varied, whole = added(float(i), float(j), t, q)
+        return varied / whole if whole > 0.0 else 0.0
+
+    return mixture
+
+
+@lru_cache(maxsize=64)
+def _added(terms: tuple[tuple[Callable[..., Any], Callable[..., Any]], ...]) -> Any:
+    """Bind the sums of terms, with and without the factor of each."""
+    factor, rate = user_piece(terms[0][0]), _as_float(terms[0][1])
+    if len(terms) == 1:
+
+        @piece
+        def last(i, j, t, q):
+            value = rate(i, j, *q[0][1])
+            return factor(t, *q[0][0]) * value, value
+
+        return last
+    others = _added(terms[1:])
+
+    @piece
+    def added(i, j, t, q):
+        value = rate(i, j, *q[0][1])
+        varied, whole = others(i, j, t, q[1:])
+        return factor(t, *q[0][0]) * value + varied, value + whole
+
+    return added
 
 
 def _share_laws(pairs: Sequence[PairProcess]) -> list[Kernel]:
@@ -181,8 +224,10 @@ def _key(model: Model, method: Method, weighting: Weighting) -> tuple[Any, ...]:
     functions += [p.law for p in lone]
     functions += [p.factor.rate for p in model.processes]
     functions += [law.rate for law in _share_laws(pairs)]
+    functions += [law.rate for term in model.kernel.in_time for law in term]
     shape = len(model.kernel.parameters), len(weighted), len(pairs), len(lone), len(sources)
-    return (type(method), *shape, *((type(p), p.splits) for p in lone), *map(digest, functions))
+    kinds = type(method), len(model.kernel.in_time), *((type(p), p.splits) for p in lone)
+    return (*kinds, *shape, *map(digest, functions))
 
 
 def uncompilable(model: Model, weighting: Weighting) -> list[str]:
@@ -190,6 +235,10 @@ def uncompilable(model: Model, weighting: Weighting) -> list[str]:
     _, lone, _ = _kinds(model)
     given: list[tuple[str, Callable[..., Any], int]] = [
         *((f"the kernel {k.label}", k.rate, 2 + len(k.parameters)) for _, k in model.kernel.parts),
+        *(
+            (f"the factor of the kernel in time, {f.text}", f.rate, 1 + len(f.arguments))
+            for f, _ in model.kernel.in_time
+        ),
         *((f"the rate of {p.called}", p.law, 2 if p.splits else 1) for p in lone),
         *((f"the rate of {p.called} in time", p.factor.rate, 1) for p in model.processes),
         *(
@@ -231,12 +280,15 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
         outcome, tally = make_outcome(outcome, weight), make_tally(weight)
     pieces = method.bind(simulated, tally)
     random = weight is not None or any(type(p).random for p in pairs)
-    share = _shares(tuple(law.rate for law in _share_laws(pairs)))
-    encounters = make_encounters(pieces.pair, outcome, factor, len(pairs), share)
+    shares = tuple(law.rate for law in _share_laws(pairs))
+    share = _one_of(shares, _share) if shares else None
+    terms = tuple((f.rate, law.rate) for f, law in model.kernel.in_time)
+    mixture = _mixture(terms) if terms else None
+    encounters = make_encounters(pieces.pair, outcome, factor, len(pairs), share, mixture)
     if not lone and not sources:
         fire = make_fire(encounters, pieces.update, random)
         burst = None
-        if pieces.burst is not None and share is None:
+        if pieces.burst is not None and share is None and mixture is None:
             burst = make_burst(pieces.burst, outcome, len(pairs), random)
         next_event = make_next_event(pieces.draw, burst)
         return make_loop(make_advance(pieces, next_event, fire), pieces.view)
@@ -279,12 +331,17 @@ def rates_for(model: Model, weighting: Weighting) -> Rates:
     )
 
 
-def factor_parameters(processes: Sequence[Process]) -> Parameters:
-    """Return the parameters of the processes, as the loop takes them, with tables to be filled."""
+def factor_parameters(processes: Sequence[Process], kernel: Kernel | None = None) -> Parameters:
+    """Return the parameters of the processes, as the loop takes them, with tables to be filled.
+
+    And those of the terms of a kernel that varies.
+    """
+    terms = () if kernel is None else kernel.in_time
+    mixture = tuple((factor.parameters, law.parameters) for factor, law in terms)
     pairs = [p for p in processes if isinstance(p, PairProcess)]
     lone = [p for p in processes if isinstance(p, LoneProcess)]
     return Parameters(
-        tuple(p.factor.parameters for p in pairs or [Aggregation()]),
+        (*(p.factor.parameters for p in pairs or [Aggregation()]), *((mixture,) if terms else ())),
         tuple(p.parameters for p in pairs or [Aggregation()]),
         tuple(law.parameters for law in _share_laws(pairs)),
         tuple(

@@ -15,7 +15,7 @@ def chosen_method(plan: Plan) -> tuple[Method, str]:
     """Return the method that is best for a plan, whatever its own is, and why."""
     if plan.subvolumes > 1:
         return SizeClass(), "it mixes sub-volumes in the least time"
-    return unforeseen(plan.physics.processes) or choose(_circumstances(plan))
+    return unforeseen(plan.physics) or choose(_circumstances(plan))
 
 
 def event_cost(plan: Plan) -> float:
@@ -25,7 +25,7 @@ def event_cost(plan: Plan) -> float:
     weightings are alike or nothing is known.
     """
     auto = plan.asked.method == "auto"
-    known = plan.subvolumes == 1 and unforeseen(plan.physics.processes) is None
+    known = plan.subvolumes == 1 and unforeseen(plan.physics) is None
     direct = plan.asked.method in (AcceptanceRejection.name, AcceptanceRejection())
     if not known or not (auto or direct):
         return 1.0

@@ -7,8 +7,10 @@ wanted, and in where a function is tried that nothing else bounds: see `smolux.t
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -16,13 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from .callables import Function, numbers_of
 from .checks import is_number, numbers
+from .content import frozen
 from .errors import InputError
 from .formula import Formula, parse
 from .intervals import Interval, range_of
+from .stated import StatedBounds
 
 Float = NDArray[np.float64]
-#: what a user may state: the lowest and the highest value, or a function of the edges of a box
-StatedBounds = tuple[float, float] | Callable[..., Any]
 
 
 def _constant(x: Any, value: Any) -> Any:
@@ -34,113 +36,11 @@ def _listed(k: Any, values: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class Stated:
-    """A Python function with what its user knows of it; made by `law`."""
-
-    function: Callable[..., Any]
-    bounds: StatedBounds | None = None
-    breakpoints: tuple[float, ...] = ()
-
-
-def law(function: Callable[..., Any], *, bounds: Any = None, breakpoints: ArrayLike = ()) -> Stated:
-    """State what is known of a Python function of time that is given as a rate.
-
-    Numbers and formulas need none of this, as what they can be is proved. Nor do functions without
-    branches on the time. What a function with branches can be is found by trial, which may step
-    over what is narrow. Of kernels `smolux.kernels.from_function` takes the same; rates by the size
-    of single particles are bounded by those of the sizes that are there.
-
-    Parameters
-    ----------
-    function : callable
-        A function of time ``f(t)``, as a process takes it.
-    bounds : float, (float, float) or callable, optional
-        The highest value, the lowest and the highest one, or ``bounds(a, b) -> (lower, upper)`` of
-        the values from a to b, which takes the parameters of the function after these. A value
-        above them that is met raises the bound, and the result warns of it.
-    breakpoints : sequence of float, optional
-        Where the function jumps or bends. The function is bounded between two of them by itself,
-        so that a short peak is neither missed nor dear.
-
-    Returns
-    -------
-    Stated
-        To be given to a process in place of the function.
-
-    Raises
-    ------
-    InputError
-        With every problem found.
-
-    Examples
-    --------
-    >>> def flash(t):
-    ...     return 1000.0 if 30 < t < 30.001 else 0.0
-    >>> from smolux.processes import Source
-    >>> flashing = Source(1.0, varying=law(flash, bounds=1000.0, breakpoints=[30, 30.001]))
-    """
-    problems: list[str] = []
-    if not callable(function):
-        problems.append(
-            f"law = {function!r}: must be a Python function; numbers and formulas are given as "
-            "they are, their bounds are proved"
-        )
-    wrong, found, points = statements(bounds, breakpoints, "law")
-    if problems + wrong:
-        raise InputError(problems + wrong)
-    return Stated(function, found, points)
-
-
-def statements(
-    bounds: Any, breakpoints: Any, what: str
-) -> tuple[list[str], StatedBounds | None, tuple[float, ...]]:
-    """Read the bounds and breakpoints that a user states of a law that is never negative.
-
-    Returns
-    -------
-    problems : list of str
-    bounds : (float, float), callable or None
-    breakpoints : tuple of float
-        Ascending.
-    """
-    problems: list[str] = []
-    stated: StatedBounds | None = None
-    points: tuple[float, ...] = ()
-    try:
-        stated = _bounds(bounds, what)
-    except InputError as error:
-        problems += error.problems
-    try:
-        points = _points(breakpoints, what)
-    except InputError as error:
-        problems += error.problems
-    return problems, stated, points
-
-
-def _bounds(given: Any, what: str) -> StatedBounds | None:
-    if given is None or callable(given):
-        return given
-    pair = (0.0, given) if is_number(given) else given
-    if isinstance(pair, (tuple, list)) and len(pair) == 2 and all(map(is_number, pair)):
-        low, high = float(pair[0]), float(pair[1])
-        if 0.0 <= low <= high < np.inf:
-            return low, high
-    raise InputError(
-        f"{what}: bounds = {given!r}: must be the highest value, the lowest and the highest one as "
-        "in (0.0, 2.0), finite and zero or more, or a function of the edges of a range"
-    )
-
-
-def _points(given: Any, what: str) -> tuple[float, ...]:
-    found = numbers(f"{what}: breakpoints", given) if np.size(given) else np.empty(0)
-    if found.ndim != 1 or not np.isfinite(found).all():
-        raise InputError(f"{what}: breakpoints = {given!r}: must be a list of finite numbers")
-    return tuple(np.unique(found).tolist())
-
-
-@dataclass(frozen=True)
 class Law:
-    """A rate law of given variables; made by `Law.read`.
+    """A rate law of given variables; made by `Law.read`, and of other laws by ``+`` and ``*``.
+
+    The sum and the product of two formulas or numbers are formulas; what else is added or
+    multiplied stays two `operands`.
 
     Attributes
     ----------
@@ -156,7 +56,9 @@ class Law:
     formula : Formula or None
     user : smolux.callables.Function or None
     values : tuple of float or None
-        For the sizes 1, 2, ...; the last one holds beyond. At most one of the four is given.
+        For the sizes 1, 2, ...; the last one holds beyond.
+    operator, operands : str, tuple of Law
+        ``+`` or ``*``, and two laws of the same variables. At most one of the five is given.
     stated : (float, float), callable or None
         Bounds that the user states, see `law`.
     breakpoints : tuple of float
@@ -171,6 +73,8 @@ class Law:
     formula: Formula | None = None
     user: Function | None = None
     values: tuple[float, ...] | None = None
+    operator: str = ""
+    operands: tuple[Law, ...] = ()
     stated: StatedBounds | None = None
     breakpoints: tuple[float, ...] = ()
 
@@ -212,6 +116,49 @@ class Law:
         listed = [f"{x:g}" for x in values[:4]] + ["..."] * (len(values) > 4)
         return cls(f"[{', '.join(listed)}]", variables, values=values)
 
+    def __add__(self, other: Any) -> Self:
+        """Add a law of the same variables, or a number."""
+        return self._with("+", other, 0.0)
+
+    __radd__ = __add__
+
+    def __mul__(self, other: Any) -> Self:
+        """Multiply by a law of the same variables, or by a number."""
+        return self._with("*", other, 1.0)
+
+    __rmul__ = __mul__
+
+    def _with(self, operator: str, other: Any, neutral: float) -> Self:
+        if is_number(other):
+            number = float(other)
+            other = type(self)(repr(number), self.variables, parameters=(number,), constant=number)
+        if not isinstance(other, type(self)) or other.variables != self.variables:
+            return NotImplemented
+        if neutral in (self.constant, other.constant):
+            return self if other.constant == neutral else other
+        text, pair = f"({self.text}) {operator} ({other.text})", (self, other)
+        if all(x.constant is not None or (x.formula and not x.names) for x in pair):
+            with contextlib.suppress(InputError):  # of a text that gets too long
+                return type(self).read(text, self.variables, text, "")
+        names, parameters = (
+            (*getattr(self, name), *getattr(other, name)) for name in ("names", "parameters")
+        )
+        points = tuple(np.unique([*self.breakpoints, *other.breakpoints]).tolist())
+        return type(self)(
+            text, self.variables, names, parameters, operator=operator, operands=pair,
+            breakpoints=points,
+        )  # fmt: skip
+
+    def _of_both(self, one: Any, two: Any) -> Any:
+        """Return what two operands give together."""
+        return one + two if self.operator == "+" else one * two
+
+    @property
+    def functions(self) -> tuple[Function, ...]:
+        """The Python functions in it."""
+        own = () if self.user is None else (self.user,)
+        return own + tuple(found for law in self.operands for found in law.functions)
+
     @property
     def rate(self) -> Callable[..., Any]:
         """``rate(*variables, *arguments) -> float``: plain Python that Numba compiles.
@@ -222,11 +169,17 @@ class Law:
             return self.formula.function((*self.variables, *self.names))
         if self.user is not None:
             return self.user.function
+        if self.operands:
+            one, two = self.operands
+            rates = frozen(one.rate), frozen(two.rate)
+            return _combined(self.operator, *rates, len(self.variables), len(one.arguments))
         return _listed if self.values is not None else _constant
 
     @property
     def arguments(self) -> tuple[Any, ...]:
         """What `rate` takes after the variables: the parameters, or the list as one array."""
+        if self.operands:
+            return tuple(value for law in self.operands for value in law.arguments)
         return self.parameters if self.values is None else (np.array(self.values),)
 
     @property
@@ -247,13 +200,15 @@ class Law:
     @property
     def numbers(self) -> Float:
         """Where it may differ from what it is beside: what is stated, and the numbers it reads."""
-        read = np.empty(0) if self.user is None else numbers_of(self.user.function)
-        return np.unique(np.concatenate([self.breakpoints, read]))
+        read = [numbers_of(each.function) for each in self.functions]
+        return np.unique(np.concatenate([self.breakpoints, *read]))
 
     def on(self, *variables: ArrayLike) -> Float:
         """Evaluate on arrays of the variables, broadcast against each other."""
         if self.user is not None:
             return self.user.evaluate(variables, self.parameters)
+        if self.operands:
+            return np.asarray(self._of_both(*(law.on(*variables) for law in self.operands)))
         arrays = np.broadcast_arrays(*(np.asarray(x, float) for x in variables))
         if self.formula is not None:
             with np.errstate(all="ignore"):
@@ -274,6 +229,8 @@ class Law:
         """
         if self.user is not None:
             return self.user.interval(variables, self.parameters)
+        if self.operands:
+            return self._of_both(*(law.interval(*variables) for law in self.operands))
         if self.formula is not None:
             found = self.rate(*variables, *self.parameters)
             return found if isinstance(found, Interval) else Interval(float(found))
@@ -308,6 +265,22 @@ class Law:
         count = len(self.values)  # the last one holds beyond
         first = np.clip(low, 1.0, count).astype(np.int64) - 1
         return range_of(np.array(self.values), first, np.clip(high, 1.0, count).astype(np.int64))
+
+
+@lru_cache(maxsize=256)
+def _combined(
+    operator: str, one: Callable[..., Any], two: Callable[..., Any], variables: int, own: int
+) -> Callable[..., Any]:
+    """Bind the sum or product of two rates; the first takes so many arguments of its own."""
+    end = variables + own
+
+    def added(*x: Any) -> Any:
+        return one(*x[:end]) + two(*x[:variables], *x[end:])
+
+    def multiplied(*x: Any) -> Any:
+        return one(*x[:end]) * two(*x[:variables], *x[end:])
+
+    return frozen(added if operator == "+" else multiplied)
 
 
 def proved_or_tried(

@@ -100,6 +100,14 @@ class Model:
         return Model(product, whole, self.initial)
 
     @property
+    def varying(self) -> tuple[str, ...]:
+        """What has a rate that depends on time: processes, and the kernel."""
+        processes = tuple(
+            f"process {p.called!r}" for p in self.processes if p.factor.constant is None
+        )
+        return (*processes, f"kernel {self.kernel.label}") if self.kernel.in_time else processes
+
+    @property
     def only_aggregates(self) -> bool:
         """Whether nothing but aggregation takes place, at whatever rate."""
         return all(isinstance(process, Aggregation) for process in self.processes)
@@ -111,7 +119,8 @@ class Model:
         pairs = [process for process in self.processes if isinstance(process, PairProcess)]
         # several of them have their rates together
         whole = sum(np.nan if f is None else f for f in factors) == 1.0
-        return self.only_aggregates and whole and all(p.shared is None for p in pairs)
+        same = not self.kernel.in_time and all(p.shared is None for p in pairs)
+        return self.only_aggregates and whole and same
 
     @property
     def open(self) -> bool:

@@ -13,10 +13,11 @@ from .callables import Function
 from .errors import InputError, Problem, about, did_you_mean
 from .initial import INITIALS, Initial, Sizes, from_sizes, monodisperse
 from .kernels.base import Kernel
-from .laws import Law, Stated
+from .laws import Law
 from .model import Model
 from .processes import PROCESSES
 from .processes.base import Process
+from .stated import Stated
 
 T = TypeVar("T")
 #: the keys that lead to a part of a model
@@ -45,8 +46,9 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (Sequence, np.ndarray)):
         return [_plain(v) for v in value]
     if isinstance(value, Law):
-        if value.user is not None:
-            return _function(value.user)
+        if value.functions:
+            sources = [each.source or each.text for each in value.functions]
+            return {FUNCTION: value.text, "source": "\n".join(sources)}
         return value.text if value.constant is None else value.constant
     if isinstance(value, Stated):
         known = {"bounds": value.bounds, "breakpoints": value.breakpoints}

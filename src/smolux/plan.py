@@ -87,7 +87,7 @@ class Plan(Settings):
 
     @cached_property
     def _windows(self) -> Windows:
-        return windows_for(self.model.processes, self.times[-1], self.weighting)
+        return windows_for(self.model.processes, self.times[-1], self.weighting, self.model.kernel)
 
     def windows(self) -> Windows:
         """Return bounds of the rate factors, which a run may correct as its own."""

@@ -60,6 +60,7 @@ from .model import Model
 from .plan import Plan
 from .processes.base import LoneProcess, PairProcess
 from .remembered import spent
+from .windows import text_of
 
 Int = NDArray[np.int64]
 
@@ -174,7 +175,9 @@ class Group:
     def _call(self, codes: Int, budget: int) -> None:
         plan = self.plan
         self.loop = self.loop or plan.loop
-        self.parameters = self.parameters or factor_parameters(plan.physics.processes)
+        self.parameters = self.parameters or factor_parameters(
+            plan.physics.processes, plan.physics.kernel
+        )
         self.loop(
             self.state,
             self.work,
@@ -284,10 +287,8 @@ class Group:
         """Raise the bounds of a factor that was found above one; the event itself takes place."""
         process = int(self.state.count[r, PROCESS])
         value, window = float(self.state.clock[r, VALUE]), int(self.state.count[r, WINDOW])
-        name, text = (
-            self.plan.model.processes[process].called,
-            self.plan.model.processes[process].factor.text,
-        )
+        found = self.plan.model.processes[process]
+        name, text = found.called, text_of(found, self.plan.model.kernel)
         if not (np.isfinite(value) and value >= 0):
             raise InputError(
                 f"the rate of {name}, {text}, is {value:.6g} at "

@@ -261,7 +261,11 @@ def _first_stretch(plan: Plan, replica: int) -> float:
         return 1e-3 * plan.times[-1]
     i, j = rng.choice(sizes, (2, 1000), p=counts / counts.sum()).astype(float)
     with np.errstate(all="ignore"):
-        mean = float(np.mean(plan.rates.arrays(i, j)))
+        rates, kernel = plan.rates.arrays(i, j), plan.physics.kernel
+        if kernel.in_time:
+            now = sum(factor(0.0) * law(i, j) for factor, law in kernel.in_time)
+            rates = np.where(rates > 0.0, rates * now / kernel(i, j), 0.0)
+        mean = float(np.mean(rates))
     factors = sum(
         float(process.factor(0.0))
         for process in plan.model.processes

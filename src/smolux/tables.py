@@ -18,6 +18,7 @@ from .content import digest
 from .core.compile import CompileError, entry, user_piece
 from .kernels import FunctionKernel, Sum
 from .kernels.base import Kernel
+from .kernels.varying import Varying
 from .weighting.base import Weighting
 
 Float = NDArray[np.float64]
@@ -45,6 +46,8 @@ def evaluated(kernel: Kernel) -> Callable[[Any, Any], Float]:
     if isinstance(kernel, Sum):
         terms = [(number, evaluated(term)) for number, term in kernel.parts]
         return lambda i, j: np.asarray(sum(number * term(i, j) for number, term in terms))
+    if isinstance(kernel, Varying):
+        return evaluated(kernel.kernel)
     if not isinstance(kernel, FunctionKernel):
         return kernel
 

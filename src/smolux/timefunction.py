@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from .boxes import subdivided
 from .callables import numbers_of, spread
 from .errors import InputError
-from .laws import Law, Stated
+from .intervals import Interval
+from .laws import Law
+from .stated import Stated
 
 Float = NDArray[np.float64]
 
@@ -84,7 +86,9 @@ class TimeFunction(Law):
         Those that the user states, and those that a function names which is known by trial alone.
         """
         read = np.empty(0)
-        if self.user is not None and self.stated is None and not self.followed:
+        if self.operands and not self.followed:
+            read = np.concatenate([law.edges for law in self.operands])  # type: ignore[attr-defined]
+        elif self.user is not None and self.stated is None and not self.followed:
             read = numbers_of(self.user.function)
             read = read if len(read) <= _TIMES else np.empty(0)
         return np.unique(np.concatenate([self.breakpoints, read]))
@@ -93,7 +97,8 @@ class TimeFunction(Law):
         """Bounds over the times ``t0 <= t <= t1``, numbers or arrays.
 
         By interval arithmetic for formulas, and for Python functions that it can follow; other
-        functions are tried at many times, and a margin is added.
+        functions are tried at many times, and a margin is added. A sum or product of which
+        intervals follow only a part has those of both together.
 
         Returns
         -------
@@ -104,8 +109,14 @@ class TimeFunction(Law):
         sides = np.broadcast_arrays(np.asarray(t0, float), np.asarray(t1, float))
         if self.stated is not None:
             lower, upper = self.stated_bounds(*sides)
+        elif self.followed:
+            lower, upper = self._proved(*sides)
+        elif self.operands:
+            found = (Interval(*law.bounds(*sides)) for law in self.operands)  # type: ignore[attr-defined]
+            both = self._of_both(*found)
+            lower, upper = both.lo, both.hi
         else:
-            lower, upper = self._proved(*sides) if self.followed else self._sampled(*sides)
+            lower, upper = self._sampled(*sides)
         return (lower, upper) if np.ndim(lower) else (float(lower), float(upper))
 
     def _proved(self, t0: Float, t1: Float) -> tuple[Float, Float]:

@@ -28,6 +28,7 @@ from .plan import Plan
 from .processes.base import LoneProcess, PairProcess
 from .replicas import Group
 from .subvolumes import Divided
+from .windows import text_of
 
 Float = NDArray[np.float64]
 
@@ -153,7 +154,7 @@ class Totals:
         found += self._raised(name, self.splits_raised, lacking, cure)
         cure = "A formula in t has proved bounds; of a function, smolux.law states them"
         for k, process in enumerate(plan.model.processes):
-            name = f"{process.called}, {process.factor.text},"
+            name = f"{process.called}, {text_of(process, plan.model.kernel)},"
             lacking = _lacking(self.missed[BY_FACTOR + k], int(self.events[k]))
             found += self._raised(name, int(self.factors_raised[k]), lacking, cure)
         return found

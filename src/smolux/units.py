@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Annotated, Any, get_type_hints
 
 import numpy as np
 
@@ -48,7 +49,25 @@ ACCELERATION = Dimension("an acceleration", "m/s^2", "9.81 m/s^2")
 KERNEL = Dimension("a collision kernel (volume per time)", "m^3/s", "1e-9 cm^3/s")
 NONE = Dimension("a plain number", "", "0.5")
 
+# Arguments of functions say what they measure by their types, see `of_arguments`.
+Length = Annotated[float, LENGTH]
+Volume = Annotated[float, VOLUME]
+MassDensity = Annotated[float, MASS_DENSITY]
+Temperature = Annotated[float, TEMPERATURE]
+Viscosity = Annotated[float, VISCOSITY]
+Rate = Annotated[float, RATE]
+Acceleration = Annotated[float, ACCELERATION]
+
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+
+
+def of_arguments(function: Callable[..., Any]) -> dict[str, Dimension]:
+    """Return what the arguments of a function measure, by their names; others are plain numbers."""
+    found = {}
+    for name, kind in get_type_hints(function, include_extras=True).items():
+        for said in getattr(kind, "__metadata__", ()):
+            found[name] = said
+    return found
 
 
 def parse(text: str, dimension: Dimension) -> float:

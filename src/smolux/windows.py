@@ -11,6 +11,7 @@ import numpy as np
 from .callables import golden
 from .core.state import LIMIT, Windows
 from .errors import InputError
+from .kernels.base import Kernel
 from .processes import Removal, Source
 from .processes.base import PairProcess, Process
 from .remembered import timed
@@ -61,11 +62,31 @@ def _glimpse(factor: TimeFunction, start: float, end: float) -> float:
     return bound if np.isfinite(bound) else 0.0
 
 
+def factors_of(process: Process, kernel: Kernel | None) -> list[TimeFunction]:
+    """Return what multiplies the rate of a process in time: for each term of a kernel that varies.
+
+    The first is that of the process alone where nothing else does.
+    """
+    terms = kernel.in_time if kernel is not None and isinstance(process, PairProcess) else ()
+    return [process.factor * factor for factor, _ in terms] or [process.factor]
+
+
+def text_of(process: Process, kernel: Kernel) -> str:
+    """Return what multiplies the rate of a process in time, for messages."""
+    return " and ".join(factor.text for factor in factors_of(process, kernel))
+
+
 @timed
 def windows_for(
-    processes: Sequence[Process], end: float, weighting: Weighting | None = None
+    processes: Sequence[Process],
+    end: float,
+    weighting: Weighting | None = None,
+    kernel: Kernel | None = None,
 ) -> Windows:
     """Bound the rate factors over windows of time that depend on the factors alone.
+
+    Terms of the kernel may have factors of their own, see `Kernel.in_time`. Pairs are drawn by
+    their sum without these, so the bound of a process is that of the largest of them.
 
     A factor that does not vary needs one window without end. Others have four windows an octave of
     time, and more where one of them may jump, whatever the output times are, so that a trajectory
@@ -76,16 +97,17 @@ def windows_for(
     InputError
         If a factor has no finite bound, or is negative, before the end.
     """
-    factors = [process.factor for process in processes]
-    if all(f.constant is not None for f in factors):
+    factors = [factors_of(process, kernel) for process in processes]
+    every = [f for each in factors for f in each]
+    if all(f.constant is not None for f in every):
         edges = [0.0, np.inf]
-        bounds = [[float(f.constant) for f in factors if f.constant is not None]]
+        bounds = [[max(float(f(0.0)) for f in each) for each in factors]]
     else:
-        windows = _edges(end, factors)
+        windows = _edges(end, every)
         edges = [*windows[:-1], np.inf]
-        columns = [[*_bounds(f, windows), 0.0] for f in factors]
+        columns = [[*np.max([_bounds(f, windows) for f in each], axis=0), 0.0] for each in factors]
         bounds = [list(row) for row in zip(*columns, strict=True)]
-        _check_factors(processes, edges, np.array(bounds), end)
+        _check_factors(processes, factors, edges, np.array(bounds), end)
     array = np.array(bounds, float)
     pairs = sum(isinstance(process, PairProcess) for process in processes)
     total = array[:, :pairs].sum(axis=1)
@@ -139,24 +161,29 @@ def _beside(processes: Sequence[Process], weighting: Weighting) -> tuple[Any, ..
 
 
 def _check_factors(
-    processes: Sequence[Process], edges: list[float], bounds: Any, end: float
+    processes: Sequence[Process],
+    factors: list[list[TimeFunction]],
+    edges: list[float],
+    bounds: Any,
+    end: float,
 ) -> None:
     problems = []
     times = np.linspace(0.0, end, 1001)
-    for k, process in enumerate(processes):
-        values = np.asarray(process.factor(times), float)
+    each = [(k, p, f) for k, p in enumerate(processes) for f in factors[k]]
+    for k, process, factor in each:
+        values = np.asarray(factor(times), float)
         wrong = ~(values >= 0)
         if wrong.any():
             t = float(times[wrong.argmax()])
             problems.append(
-                f"the rate of {process.called}, {process.factor.text}, is {values[wrong][0]:.6g} "
+                f"the rate of {process.called}, {factor.text}, is {values[wrong][0]:.6g} "
                 f"at t = {t:.6g}, before the end at {end:g}; it must not be negative: end earlier, "
                 "or cut it off with max(0, ...)"
             )
         elif not np.isfinite(bounds[:, k]).all():
             t = edges[int(np.argmin(np.isfinite(bounds[:, k])))]
             problems.append(
-                f"the rate of {process.called}, {process.factor.text}, has no finite bound near "
+                f"the rate of {process.called}, {factor.text}, has no finite bound near "
                 f"t = {t:.6g}; it must stay finite up to the end"
             )
     if problems:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from dataclasses import MISSING, fields
 
 import pytest
@@ -10,12 +11,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from smolux.case import Output, Parallel, Run, Solve, parse
-from smolux.case.physics import ARGUMENTS, FIELDS
+from smolux.case.physics import FIELDS
 from smolux.case.write import to_toml
 from smolux.initial import INITIALS
 from smolux.kernels import KERNELS
 from smolux.processes import PROCESSES
 from smolux.settings.solution import OBSERVED
+from smolux.units import of_arguments
 
 #: values for every key of a table; a key of a new law, process or setting belongs here
 KERNEL = {
@@ -124,14 +126,18 @@ def read_back_equal(content):
     ]
 
 
-def test_every_measured_argument_belongs_to_a_constructor():
-    known = {
-        key
-        for kernel in KERNELS
-        for constructor in kernel.constructors
-        for key in inspect.signature(getattr(kernel, constructor)).parameters
-    }
-    assert set(ARGUMENTS) <= known
+def test_arguments_of_constructors_say_what_they_measure():
+    """Once, where the argument is; the words of the docstring are those of this unit."""
+    for kernel in KERNELS:
+        for constructor in kernel.constructors:
+            make = getattr(kernel, constructor)
+            measured = of_arguments(make)
+            plain = set(inspect.signature(make).parameters) - set(measured)
+            assert plain <= {"dimension"}
+            for name, dimension in measured.items():
+                text = inspect.getdoc(make).partition(f"\n{name} : float")[2].partition(" : ")[0]
+                unit = dimension.unit.replace("*", " ").replace("^2", "²").replace("^3", "³")
+                assert re.search(rf"\b[Ii]n {re.escape(unit)}\b", text), (name, unit)
 
 
 LIMITS = settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))

@@ -47,6 +47,56 @@ def twice(a: float, b: float, height: float) -> tuple[float, float]:
 # --- one law -------------------------------------------------------------------------------------
 
 
+def rises(t: float, a: float = 2.0) -> float:
+    return a + t * t
+
+
+def jumps(t: float, high: float = 3.0) -> float:
+    return high if t < 1.25 else 0.5
+
+
+@pytest.mark.parametrize("one", ["1 + t", 2.0, rises, jumps, sx.law(jumps, bounds=3.0)])
+@pytest.mark.parametrize("two", ["3 - t", 0.5, rises, jumps])
+@pytest.mark.parametrize("operator", ["+", "*"])
+def test_sums_and_products(one: Any, two: Any, operator: str) -> None:
+    """Values, the compiled law and bounds are those of the two numbers."""
+    laws = TimeFunction.of(one), TimeFunction.of(two)
+    both = laws[0] + laws[1] if operator == "+" else laws[0] * laws[1]
+    times = np.linspace(0.0, 2.0, 41)
+    first, second = (law(times) for law in laws)
+    expected = first + second if operator == "+" else first * second
+    np.testing.assert_allclose(both(times), expected, rtol=1e-14)
+    for t, value in zip(times, expected, strict=True):
+        assert both.rate(t, *both.arguments) == pytest.approx(value, rel=1e-14)
+    low, high = both.bounds(times[:-1], times[1:])
+    assert (low <= np.minimum(expected[1:], expected[:-1])).all()
+    assert (high >= np.maximum(expected[1:], expected[:-1])).all()
+    assert both == (laws[0] + laws[1] if operator == "+" else laws[0] * laws[1])
+    assert len({both, laws[0]}) == 2
+    # where one of both jumps, windows of time end
+    assert (1.25 in both.edges) == any(f is jumps for f in (one, two))
+    assert len(both.functions) == sum(law.user is not None for law in laws)
+
+
+def test_what_stays_of_sums_and_products() -> None:
+    law = TimeFunction.of("1 + t")
+    assert 1 * law is law
+    assert law + 0 is law
+    assert 2 * law == law * 2
+    assert (law * TimeFunction.of("2 - t")).text == "(1 + t) * (2 - t)"
+    assert (2 * TimeFunction.of(3)).constant == 6.0
+    stated = TimeFunction.of(sx.law(square_spike, bounds=1000.0, breakpoints=[30.0, 30.01]))
+    assert (law * stated).breakpoints == (30.0, 30.01)
+    assert (law * stated).bounds(29.0, 31.0)[1] == pytest.approx(32.0e3)
+    long = TimeFunction.of("t + 1.5" + "0" * 500)
+    assert (long * long)(0.5) == 4.0  # longer than a formula may be
+    sizes = SizeFunction.of([1.0, 4.0], "rate") * SizeFunction.of("k", "rate") + 1.0
+    np.testing.assert_array_equal(sizes(np.array([1.0, 2.0, 3.0])), [2.0, 9.0, 13.0])
+    assert sizes.rate(3.0, *sizes.arguments) == 13.0
+    with pytest.raises(TypeError):
+        law * SizeFunction.of("k", "rate")  # type: ignore[operator]
+
+
 @pytest.mark.parametrize(
     ("law", "points"),
     [

@@ -10,7 +10,7 @@ import pytest
 
 from smolux.deterministic.timemesh import TimeMesh, within
 from smolux.errors import InputError
-from smolux.laws import law
+from smolux.stated import law
 from smolux.timefunction import TimeFunction
 
 

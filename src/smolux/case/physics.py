@@ -27,18 +27,7 @@ FIELDS: dict[tuple[str, str], Dimension] = {
     ("initial", "densities"): units.NUMBER_DENSITY,
 }
 
-#: what the arguments of physical constructors measure, by their names
-ARGUMENTS: dict[str, Dimension] = {
-    "temperature": units.TEMPERATURE,
-    "viscosity": units.VISCOSITY,
-    "gradient": units.RATE,
-    "gravity": units.ACCELERATION,
-    "radius": units.LENGTH,
-    "volume": units.VOLUME,
-    "density": units.MASS_DENSITY,
-    "density_difference": units.MASS_DENSITY,
-}
-
+_IN_TIME = 'a number or a formula in t such as "0.01*(1 - t/400)"'
 _INITIALS = {i.name: i for i in INITIALS}
 
 
@@ -91,6 +80,17 @@ def build(physics: Physics, si: bool, problems: Problems) -> Model | None:
 
 
 def _kernel(table: Table) -> tuple[dict[str, Any], str]:
+    """Read a law, which a function of time may multiply; from which quantities, or nothing."""
+    varying = table.take("varying")
+    known = isinstance(varying, (int, float, str)) and not isinstance(varying, bool)
+    if "varying" in table and not known:
+        table.bad("varying", f"must be {_IN_TIME}")
+    table.content.pop("varying", None)
+    data, origin = _law(table)
+    return ({**data, "varying": varying} if known else data), origin
+
+
+def _law(table: Table) -> tuple[dict[str, Any], str]:
     laws = {k.name: k for k in KERNELS if k.name != "formula"}
     if "terms" in table:
         return _sum(table)
@@ -168,8 +168,9 @@ def _constructed(table: Table, law: type[Kernel], constructor: str) -> tuple[dic
     table.known.append("name")
     given: dict[str, float] = {}
     before = len(table.problems.messages)
+    measured = units.of_arguments(make)
     for key, argument in _signature(law, constructor).items():
-        dimension = ARGUMENTS.get(key)
+        dimension = measured.get(key)
         if key not in table:
             table.known.append(key)
             if argument.default is argument.empty:
@@ -262,7 +263,7 @@ def _of_process(kind: type[Process], key: str) -> str:
         return 'a text such as "wall"'
     variable = getattr(kind, "variables", {"rate": "t"}).get(key)
     if variable == "t":
-        return 'a number or a formula in t such as "0.01*(1 - t/400)"'
+        return _IN_TIME
     if variable == "k":
         return 'a number, a formula in k such as "k**(2/3)", or a list of values for k = 1, 2, ...'
     if variable is not None:

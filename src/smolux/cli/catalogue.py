@@ -8,6 +8,7 @@ from dataclasses import MISSING, fields
 from ..errors import InputError, did_you_mean
 from ..kernels import KERNELS
 from ..kernels.base import Kernel
+from ..units import of_arguments
 
 
 def example(law: type[Kernel]) -> Kernel:
@@ -87,8 +88,6 @@ def details(name: str) -> str:
 
 
 def _physical(law: type[Kernel], constructor: str) -> list[str]:
-    from ..case.physics import ARGUMENTS
-
     make = getattr(law, constructor)
     words = inspect.cleandoc(make.__doc__).splitlines()[0].replace("``", "")
     lines = [
@@ -97,8 +96,9 @@ def _physical(law: type[Kernel], constructor: str) -> list[str]:
         "    [kernel]",
         f'    name = "{law.name}"',
     ]
+    measured = of_arguments(make)
     for key, argument in inspect.signature(make).parameters.items():
-        dimension = ARGUMENTS.get(key)
+        dimension = measured.get(key)
         optional = "" if argument.default is argument.empty else "   # may be left out"
         text = f'"{dimension.example}"' if dimension else repr(argument.default)
         lines.append(f"    {key} = {text}{optional}")

@@ -24,6 +24,7 @@ from ..processes import Aggregation, Removal, Source
 from ..resources import available_memory, cores
 from ..room import amount
 from ..settings import Settings
+from ..windows import factors_of
 
 Float = NDArray[np.float64]
 
@@ -262,8 +263,8 @@ def negative_rates(case: Case) -> list[str]:
     """Find mistakes that a run would meet only on its way: rates that fall below zero."""
     found = []
     times = np.linspace(0.0, case.times[-1], 2001)
-    for process in case.model.processes:
-        factor = process.factor
+    model = case.model
+    for process, factor in ((p, f) for p in model.processes for f in factors_of(p, model.kernel)):
         if factor.constant is not None:
             continue
         values = np.asarray(factor(times))

@@ -89,17 +89,19 @@ class Books(NamedTuple):
 def make_choose_process(
     pairs: int,
     factor: Callable[..., Any],
-    pair: Callable[..., Any] | None = None,
-    share: Callable[..., Any] | None = None,
+    pair: Any = None,
+    share: Any = None,
+    mixture: Any = None,
 ) -> Callable[..., Any]:
     """Bind the choice of the process of an encounter, of the first `pairs` ones.
 
     ``factor(r, t, q)`` is the rate of process `r` as a multiple of the kernel, `pair` that of the
-    method, and ``share(r, i, j, q)`` the share of the encounters of two sizes in which process `r`
-    takes place; None if that is all of them.
+    method, and ``share(r, (i, j), q)`` the share of the encounters of two sizes in which process `r`
+    takes place; None if that is all of them. ``mixture(i, j, t, q)`` is the rate of two sizes as a
+    multiple of that by which they were drawn, if it varies in time.
     """
-    if pair is not None and share is not None:
-        choose = make_choose_process(pairs, factor)
+    if share is not None:
+        choose = make_choose_process(pairs, factor, pair, None, mixture)
 
         @piece
         def choose_and_share(s, w, windows, q):
@@ -108,7 +110,7 @@ def make_choose_process(
             if r < 0:
                 return r
             i, j = pair(s, w)
-            value = share(r, i, j, q.shares)
+            value = share(r, (i, j), q.shares)
             if not 0.0 <= value <= ROUNDING:
                 note_bad(s, i, j, value)
                 s.count[PROCESS] = r
@@ -116,6 +118,8 @@ def make_choose_process(
             return r if rng.uniform(s.rng) < value else -1
 
         return choose_and_share
+
+    mixed = mixture is not None
 
     @piece
     def choose_process(s, w, windows, q):
@@ -134,6 +138,9 @@ def make_choose_process(
             r += 1
             bound = windows.bounds[window, r] + s.clock[CLOCKS + r]
         value = factor(r, s.clock[PENDING], q.factors)
+        if mixed:
+            i, j = pair(s, w)
+            value *= mixture(i, j, s.clock[PENDING], q.factors[-1])
         # x is uniform below the bound, and serves again
         return thinned(s, r, value, bound, x)
 
@@ -147,6 +154,7 @@ def make_encounters(
     factor: Callable[..., Any],
     pairs: int,
     share: Callable[..., Any] | None = None,
+    mixture: Callable[..., Any] | None = None,
 ) -> Kinds:
     """Bind encounters.
 
@@ -178,7 +186,7 @@ def make_encounters(
         s.missed[BY_KERNEL] += s.missed[IN_DOUBT]
         s.missed[IN_DOUBT] = 0.0
 
-    return Kinds(alive, make_choose_process(pairs, factor, pair, share), result, note)
+    return Kinds(alive, make_choose_process(pairs, factor, pair, share, mixture), result, note)
 
 
 @lru_cache(maxsize=64)

@@ -210,7 +210,8 @@ class Parameters(NamedTuple):
     ----------
     factors, outcomes, shares : tuple
         Of pairs: of the factors in time, of what comes of an encounter, and of the share of them
-        in which it does, if any of these is not one.
+        in which it does, if any of these is not one. Of a kernel that varies `factors` has one more
+        entry: for each term of it those of its factor and of its rate.
     lone, lone_factors : tuple
         Of single particles: of the rates, see `smolux.core.lone.Law`, and of the factors.
     source_factors : tuple

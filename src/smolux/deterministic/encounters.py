@@ -12,6 +12,7 @@ from ..kernels.shared import Shared
 from ..model import Model
 from ..processes.base import PairProcess
 from ..processes.daughters import Merged
+from ..timefunction import TimeFunction
 from .lattice import on_multiples
 from .meeting import Meeting
 from .operator import Direct, Operator, OperatorFactory
@@ -48,18 +49,26 @@ class Encounters:
         One at least; processes with equal shares have one law.
     merging : list of Kernel
         Those by which particles merge.
+    factors : list of TimeFunction
+        What multiplies the terms of the kernel, of each of which the processes have laws.
     """
 
     def __init__(self, model: Model, method: str, tolerance: float, unit: int = 1) -> None:
         pairs = [p for p in model.processes if isinstance(p, PairProcess)]
         shares = [p.shared for p in pairs]
         different = [s for k, s in enumerate(shares) if s not in shares[:k]] or [None]
-        #: for each process of pairs, which law it has
-        self._of = [different.index(share) for share in shares]
-        self.laws: list[Kernel] = [
-            model.kernel if share is None else Shared(model.kernel, share) for share in different
+        terms = model.kernel.in_time or ((TimeFunction.of(1.0), model.kernel),)
+        self.factors = [factor for factor, _ in terms]
+        #: for each process of pairs, which laws it has, one of each term
+        self._of = [
+            [len(terms) * different.index(share) + k for k in range(len(terms))] for share in shares
         ]
-        merging = {k for k, p in zip(self._of, pairs, strict=True) if merges(p)}
+        self.laws: list[Kernel] = [
+            kernel if share is None else Shared(kernel, share)
+            for share in different
+            for _, kernel in terms
+        ]
+        merging = {k for ks, p in zip(self._of, pairs, strict=True) if merges(p) for k in ks}
         self.merging = [self.laws[k] for k in sorted(merging)]
         self._factories = [
             OperatorFactory(on_multiples(law, unit), method, tolerance) for law in self.laws
@@ -133,15 +142,16 @@ class Encounters:
         """Return the encounters of each law, of densities of shape (S, M)."""
         return [Meeting(operator, sizes, n) for operator in self._operators]
 
-    def law_of(self, p: int) -> int:
-        """Return which law process number `p` has; the first, if it is none of pairs."""
-        return self._of[p] if p < len(self._of) else 0
+    def laws_of(self, p: int) -> list[int]:
+        """Return which laws process number `p` has, for each of `factors`."""
+        return self._of[p]
 
-    def by_law(self, factors: Sequence[float]) -> list[float]:
-        """Return the sums of a number for each process of pairs over those of each law."""
+    def by_law(self, factors: Sequence[Sequence[float]]) -> list[float]:
+        """Return the sums of numbers for each process of pairs and term over those of each law."""
         sums = [0.0] * len(self.laws)
-        for p, factor in enumerate(factors):
-            sums[self._of[p]] += factor
+        for laws, each in zip(self._of, factors, strict=True):
+            for law, factor in zip(laws, each, strict=True):
+                sums[law] += factor
         return sums
 
     def loss(self, weights: Sequence[float], n: Float) -> Float:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..model import Model
 from ..processes.base import PairProcess, Process
+from ..timefunction import TimeFunction
 from .encounters import Encounters, merges
 from .gel import gel_affinity
 from .terms import SUMS, Flow, Leaving, term_of
@@ -117,12 +118,13 @@ class Equations:
         meetings = self.encounters.meet(self.sizes, n)
         flow = Flow(n, len(self.processes))
         for p, term in enumerate(self._terms):
-            meeting = meetings[self.encounters.law_of(p)]
-            term.add(p, self._factor(p, times), n, meeting, flow)
+            for law, factor in self._ways(p, times):
+                term.add(p, factor, n, meetings[law], flow)
         self._beyond = [None if m.beyond is None else m.beyond[-1] for m in meetings]
         if self._gel:
             for p in range(len(self.pairs)):  # which all aggregate
-                self._to_gel(p, self._factor(p, times), n, flow)
+                for law, factor in self._ways(p, times):
+                    self._to_gel(p, law, factor, n, flow)
         if self.cut:
             flow.leave()
         return flow.rates, flow.along
@@ -141,10 +143,9 @@ class Equations:
         found = zip(weights, self._beyond, strict=True)
         return np.asarray(sum(w * b for w, b in found if b is not None))
 
-    def _to_gel(self, p: int, factor: Float, n: Float, flow: Flow) -> None:
+    def _to_gel(self, p: int, law: int, factor: Float, n: Float, flow: Flow) -> None:
         """Let the mass beyond the window take up particles."""
-        gel = self._gel[self.encounters.law_of(p)]
-        lost = n * gel * (factor * (self.mass - n @ self.sizes))[:, None]
+        lost = n * self._gel[law] * (factor * (self.mass - n @ self.sizes))[:, None]
         events = lost.sum(axis=1)
         flow.rates -= lost
         flow.events[:, p] += events
@@ -153,10 +154,24 @@ class Equations:
 
     def _factor(self, p: int, times: Float) -> Float:
         """Return how often a process takes place at some times, relative to its rate."""
-        law = self._factors[p]
+        return self._at(self._factors[p], times, f"the rate of {self.processes[p].called}")
+
+    def _at(self, law: TimeFunction, times: Float, what: str) -> Float:
         if law.constant is not None:
             return np.full(len(times), law.constant)
-        return factor_at(law, np.clip(times, *self.span), f"the rate of {self.processes[p].called}")
+        return factor_at(law, np.clip(times, *self.span), what)
+
+    def _ways(self, p: int, times: Float) -> list[tuple[int, Float]]:
+        """Return the laws of encounters of a process, each with how often it takes place by it.
+
+        For what needs no encounter, the first law and the rate.
+        """
+        factor = self._factor(p, times)
+        if p >= len(self.pairs):
+            return [(0, factor)]
+        terms = zip(self.encounters.laws_of(p), self.encounters.factors, strict=True)
+        what = "the factor of the kernel"
+        return [(law, factor * self._at(each, times, what)) for law, each in terms]
 
     def conserves(self, n: Float) -> bool:
         """Whether no mass leaves at a rate that depends on what is there."""
@@ -170,8 +185,13 @@ class Equations:
         ``1 + λ`` and 1 with shattering.
         """
         at = np.array([t])
-        factors = [float(self._factor(p, at)[0]) for p in range(len(self.pairs))]
-        merged = [f if merges(p) else 0.0 for f, p in zip(factors, self.pairs, strict=True)]
+        factors = [
+            [float(factor[0]) for _, factor in self._ways(p, at)] for p in range(len(self.pairs))
+        ]
+        merged = [
+            each if merges(process) else [0.0] * len(each)
+            for each, process in zip(factors, self.pairs, strict=True)
+        ]
         return self.encounters.by_law(factors), self.encounters.by_law(merged)
 
     def loss(self, t: float, n: Float) -> Float:

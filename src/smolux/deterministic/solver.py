@@ -186,7 +186,7 @@ class Run:
         mass = float(start @ np.arange(1.0, len(start) + 1.0))
         reacts = settings.gel == "reacts"
         self.equations = Equations(physics, self.encounters, count, mass, reacts, unit)
-        laws = [process.factor for process in model.processes]
+        laws = [process.factor for process in model.processes] + self.encounters.factors
         self.integrator = Integrator(
             self.equations,
             n,

@@ -122,10 +122,9 @@ def steady_state(
     """
     window = renamed("window", window, "largest", largest)
     model = frozen(model)
-    varying = [p.called for p in model.processes if p.factor.constant is None]
-    if varying:
+    if model.varying:
         raise InputError(
-            f"process {varying[0]!r}: its rate depends on time, so there is no steady state; "
+            f"{model.varying[0]}: its rate depends on time, so there is no steady state; "
             "give it a number"
         )
     if model.only_aggregates:

@@ -10,6 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from smolux.units import MassDensity, Temperature, Volume
+
 from .base import BOLTZMANN, Float, Kernel, check_parameters, check_positive, widen
 from .majorant import Majorant
 
@@ -49,7 +51,9 @@ class Ballistic(Kernel):
         check_parameters(self)
 
     @classmethod
-    def free_molecular(cls, temperature: float, density: float, volume: float) -> Ballistic:
+    def free_molecular(
+        cls, temperature: Temperature, density: MassDensity, volume: Volume
+    ) -> Ballistic:
         """Rate in a dilute gas, in m³/s.
 
         Parameters

@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from smolux.errors import InputError, Problem
 from smolux.intervals import Interval
+from smolux.stated import Stated
+from smolux.timefunction import TimeFunction
 
 from ..checks import is_number
 from .majorant import Majorant
@@ -76,6 +78,14 @@ class Kernel:
     def parts(self) -> tuple[tuple[float, Kernel], ...]:
         """The terms of a sum, each after its coefficient; no sums are among them."""
         return ((1.0, self),)
+
+    @property
+    def in_time(self) -> tuple[tuple[TimeFunction, Kernel], ...]:
+        """Laws that do not vary, each after what multiplies it in time; none if nothing does.
+
+        These laws add up to this one, which as a function of two sizes has all factors one.
+        """
+        return ()
 
     @property
     def label(self) -> str:
@@ -197,11 +207,18 @@ class Kernel:
     __radd__ = __add__  # of sum(kernels), which begins with 0
 
     def __mul__(self, number: Any) -> Kernel:
-        """Multiply the rates by a positive number."""
-        from .sum import Sum
+        """Multiply the rates by a positive number, or by a function of time.
 
-        if not is_number(number):
+        That is a formula in t such as ``"1 + 0.1*t"``, a Python function, or one with what is known
+        of it, see `smolux.law`.
+        """
+        from .sum import Sum
+        from .varying import varied
+
+        if isinstance(number, Kernel):
             return NotImplemented
+        if not is_number(number):
+            return varied(self, number) if _in_time(number) else NotImplemented
         scale = {
             f.name: float(number) * getattr(self, f.name) for f in fields(self) if f.name == "scale"
         }
@@ -241,6 +258,11 @@ class Kernel:
             "gels": self.gels,
             "reference": self.reference,
         }
+
+
+def _in_time(value: Any) -> bool:
+    """Whether a value may be a function of time."""
+    return isinstance(value, (str, Stated, TimeFunction)) or callable(value)
 
 
 def _of_rate(name: str, kernel: Kernel) -> Any:

@@ -9,6 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from smolux.units import Temperature, Viscosity
+
 from .base import BOLTZMANN, Float, Kernel, check_parameters, check_positive, ratios, widen
 from .majorant import Majorant
 
@@ -51,7 +53,9 @@ class Brownian(Kernel):
         check_parameters(self, dimension=(1.0, np.inf))
 
     @classmethod
-    def continuum(cls, temperature: float, viscosity: float, dimension: float = 3.0) -> Brownian:
+    def continuum(
+        cls, temperature: Temperature, viscosity: Viscosity, dimension: float = 3.0
+    ) -> Brownian:
         """Rate in a fluid, ``scale = 2 k T / (3 viscosity)``, in m³/s.
 
         Parameters

@@ -14,7 +14,7 @@ from smolux.laws import Law
 from .own import SIZES, OwnKernel
 
 #: words with a meaning in the table of a kernel
-_KEYS = ("name", "formula", "terms", "coefficient")
+_KEYS = ("name", "formula", "terms", "coefficient", "varying")
 
 
 @dataclass(frozen=True)

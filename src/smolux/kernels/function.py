@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from smolux.callables import Function, wrong_number
 from smolux.errors import InputError
-from smolux.laws import Law, StatedBounds, statements
+from smolux.laws import Law
+from smolux.stated import StatedBounds, statements
 
 from .own import SIZES, OwnKernel
 

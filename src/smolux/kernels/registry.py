@@ -11,6 +11,7 @@ from smolux.errors import InputError, Problem, about, did_you_mean
 from .base import Kernel
 from .formula_kernel import formula
 from .sum import Sum
+from .varying import varied
 
 
 def _laws() -> tuple[type[Kernel], ...]:
@@ -42,7 +43,7 @@ def from_dict(table: Mapping[str, Any]) -> Kernel:
         ``name`` and the parameters of the law. ``name = "brownian.continuum"`` calls a constructor
         from physical quantities, in SI units; ``name = "formula"`` takes the text as ``formula``,
         ``name = "sum"`` a list of such tables as ``terms``, each of which may have a
-        ``coefficient``.
+        ``coefficient``. Each table may have ``varying``, a number or a formula in t.
 
     Returns
     -------
@@ -61,6 +62,11 @@ def from_dict(table: Mapping[str, Any]) -> Kernel:
     if not isinstance(table, Mapping) or not isinstance(table.get("name"), str):
         raise InputError(f"kernel = {table!r}: needs a name, such as {{'name': 'ballistic'}}")
     rest = {str(key): value for key, value in table.items() if key != "name"}
+    if "varying" in rest:
+        varying = rest.pop("varying")
+        kernel = from_dict({"name": table["name"], **rest})
+        with about("varying"):
+            return varied(kernel, varying)
     name = table["name"]
     if name == "formula":
         text = rest.pop("formula", None)

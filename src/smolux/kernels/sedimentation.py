@@ -10,6 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from smolux.units import Acceleration, Length, MassDensity, Viscosity
+
 from .base import Float, Kernel, check_parameters, check_positive, widen
 from .majorant import Majorant
 
@@ -52,7 +54,11 @@ class Sedimentation(Kernel):
 
     @classmethod
     def stokes(
-        cls, density_difference: float, viscosity: float, radius: float, gravity: float = 9.80665
+        cls,
+        density_difference: MassDensity,
+        viscosity: Viscosity,
+        radius: Length,
+        gravity: Acceleration = 9.80665,
     ) -> Sedimentation:
         """Rate of spheres that settle at their Stokes velocity, in m³/s.
 

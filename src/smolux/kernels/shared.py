@@ -16,12 +16,14 @@ from smolux.checks import is_number
 from smolux.content import frozen
 from smolux.errors import InputError
 from smolux.intervals import Interval
+from smolux.timefunction import TimeFunction
 
 from .base import Kernel, widen
 from .check import sample_sizes
 from .constant import Constant
 from .formula_kernel import formula
 from .function import from_function
+from .made import MadeOfKernels
 from .majorant import Majorant
 from .registry import from_dict
 
@@ -99,7 +101,7 @@ def share_law(given: Any, what: str) -> Kernel:
 
 
 @dataclass(frozen=True)
-class Shared(Kernel):
+class Shared(MadeOfKernels):
     """``K(i, j) s(i, j)`` with a share s of the encounters, between 0 and 1.
 
     The rate of a pair whose share is not is no number, which ends a run.
@@ -108,6 +110,16 @@ class Shared(Kernel):
     kernel: Kernel
     share: Kernel
     name: ClassVar[str] = "shared"
+
+    @property
+    def made_of(self) -> tuple[Kernel, ...]:
+        """See `MadeOfKernels`."""
+        return self.kernel, self.share
+
+    @property
+    def in_time(self) -> tuple[tuple[TimeFunction, Kernel], ...]:
+        """See `Kernel.in_time`; each law times the share."""
+        return tuple((factor, Shared(law, self.share)) for factor, law in self.kernel.in_time)
 
     @property
     def label(self) -> str:
@@ -129,21 +141,6 @@ class Shared(Kernel):
     def parameters(self) -> tuple[float, ...]:
         """See `Kernel.parameters`."""
         return (*self.kernel.parameters, *self.share.parameters)
-
-    @property
-    def rigorous(self) -> bool:  # type: ignore[override]
-        """See `Kernel`."""
-        return self.kernel.rigorous and self.share.rigorous
-
-    @property
-    def searched(self) -> bool:  # type: ignore[override]
-        """See `Kernel`."""
-        return self.kernel.searched or self.share.searched
-
-    @property
-    def arbitrary(self) -> bool:  # type: ignore[override]
-        """See `Kernel`."""
-        return self.kernel.arbitrary or self.share.arbitrary
 
     @property
     def gels(self) -> bool | None:
@@ -168,11 +165,6 @@ class Shared(Kernel):
     def majorant(self) -> Majorant | None:
         """See `Kernel.majorant`; that of the kernel, as no share is above one."""
         return self.kernel.majorant()
-
-    @property
-    def singled_out(self) -> Float:
-        """See `Kernel.singled_out`."""
-        return np.unique(np.concatenate([self.kernel.singled_out, self.share.singled_out]))
 
 
 @lru_cache(maxsize=64)

@@ -10,6 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from smolux.units import Rate, Volume
+
 from .base import Float, Kernel, check_parameters, check_positive, corners
 from .majorant import Majorant
 
@@ -44,7 +46,7 @@ class Shear(Kernel):
         check_parameters(self)
 
     @classmethod
-    def laminar(cls, gradient: float, volume: float) -> Shear:
+    def laminar(cls, gradient: Rate, volume: Volume) -> Shear:
         """Rate in a laminar shear flow, ``K = (4/3) G (r_i + r_j)^3``, in m³/s.
 
         Parameters

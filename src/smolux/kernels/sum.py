@@ -14,17 +14,22 @@ from smolux.checks import is_number
 from smolux.content import frozen
 from smolux.errors import InputError
 from smolux.intervals import Interval
+from smolux.timefunction import TimeFunction
 
 from .base import Float, Kernel
+from .made import MadeOfKernels
 from .majorant import Majorant
+from .varying import ONE
 
 
 @dataclass(frozen=True)
-class Sum(Kernel):
+class Sum(MadeOfKernels):
     """Several mechanisms at once: ``K(i, j) = sum_r c_r K_r(i, j)``.
 
-    Made by ``+`` and ``*``: ``kernels.Brownian.continuum(...) + 0.5 * kernels.Shear(...)``. That
-    rates add is exact for mechanisms that do not change each other, and an approximation for
+    Made by ``+`` and ``*``: ``kernels.Brownian.continuum(...) + 0.5 * kernels.Shear(...)``. Terms
+    may be multiplied by functions of time, too: ``kernels.Shear(...) * "exp(-t)"``.
+
+    That rates add is exact for mechanisms that do not change each other, and an approximation for
     others, such as Brownian motion and a flow (M. Elimelech, J. Gregory, X. Jia and R. Williams,
     Particle Deposition and Aggregation, Butterworth-Heinemann 1995, section 6.6).
 
@@ -76,6 +81,25 @@ class Sum(Kernel):
         """See `Kernel.parts`."""
         return tuple(zip(self.coefficients, self.terms, strict=True))
 
+    @property
+    def in_time(self) -> tuple[tuple[TimeFunction, Kernel], ...]:
+        """See `Kernel.in_time`; terms with the same factor are one law."""
+        by_factor: dict[TimeFunction, list[tuple[float, Kernel]]] = {}
+        for number, kernel in self.parts:
+            ((factor, plain),) = kernel.in_time or ((ONE, kernel),)
+            by_factor.setdefault(factor, []).append((number, plain))
+        if list(by_factor) == [ONE]:
+            return ()
+        return tuple(
+            (factor, Sum(tuple(k for _, k in terms), tuple(c for c, _ in terms)))
+            for factor, terms in by_factor.items()
+        )
+
+    @property
+    def made_of(self) -> tuple[Kernel, ...]:
+        """See `MadeOfKernels`."""
+        return self.terms
+
     def __repr__(self) -> str:
         return " + ".join(f"{'' if c == 1 else f'{c!r} * '}{k!r}" for c, k in self.parts)
 
@@ -103,21 +127,6 @@ class Sum(Kernel):
     def cheap(self) -> bool:  # type: ignore[override]
         """See `Kernel`."""
         return all(kernel.cheap for kernel in self.terms)
-
-    @property
-    def rigorous(self) -> bool:  # type: ignore[override]
-        """See `Kernel`."""
-        return all(kernel.rigorous for kernel in self.terms)
-
-    @property
-    def searched(self) -> bool:  # type: ignore[override]
-        """See `Kernel`."""
-        return any(kernel.searched for kernel in self.terms)
-
-    @property
-    def arbitrary(self) -> bool:  # type: ignore[override]
-        """See `Kernel`."""
-        return any(kernel.arbitrary for kernel in self.terms)
 
     @property
     def exact(self) -> str | None:  # type: ignore[override]
@@ -170,11 +179,6 @@ class Sum(Kernel):
         known = [(number, majorant) for number, majorant in found if majorant is not None]
         terms = tuple((number * w, p, q) for number, m in known for w, p, q in m.terms)
         return Majorant(terms, min(m.least for _, m in known))
-
-    @property
-    def singled_out(self) -> Float:
-        """See `Kernel.singled_out`."""
-        return np.unique(np.concatenate([kernel.singled_out for kernel in self.terms]))
 
     def to_dict(self) -> dict[str, Any]:
         """See `Kernel.to_dict`: the terms, each with its coefficient."""

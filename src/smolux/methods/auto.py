@@ -10,7 +10,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..processes.base import PairProcess, Process
+from ..model import Model
+from ..processes.base import PairProcess
 from .acceptance_rejection import AcceptanceRejection
 from .base import Method, Rates
 from .low_rank import LowRank
@@ -210,15 +211,16 @@ def effort(run: Circumstances) -> tuple[float, float]:
     return found if math.isfinite(found) else math.inf, events
 
 
-def unforeseen(processes: Sequence[Process]) -> tuple[Method, str] | None:
+def unforeseen(model: Model) -> tuple[Method, str] | None:
     """Choose for systems that the estimate does not cover: not for encounters alone."""
-    pairs = [p for p in processes if isinstance(p, PairProcess)]
-    if pairs == list(processes) and not any(p.random or p.shared for p in pairs):
+    pairs = [p for p in model.processes if isinstance(p, PairProcess)]
+    if model.kernel.in_time:
+        what = "a kernel that varies in time"
+    elif pairs == list(model.processes) and not any(p.random or p.shared for p in pairs):
         return None
-    return (
-        SizeClass(),
-        "sizes are not foreseen for these processes, and its cost depends on them least",
-    )
+    else:
+        what = "these processes"
+    return SizeClass(), f"sizes are not foreseen for {what}, and its cost depends on them least"
 
 
 def costs(run: Circumstances) -> tuple[dict[type[Method], float], float]:

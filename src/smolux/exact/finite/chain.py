@@ -50,6 +50,8 @@ def _events(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Float]:
     """From-states, to-states and rates of all events; a shattered pair of monomers changes none."""
     i = np.arange(1.0, n + 1)
+    if getattr(kernel, "in_time", ()):
+        raise InputError("kernel: varies in time, and the chain is that of constant rates")
     rates = np.broadcast_to(np.asarray(kernel(i[:, None], i[None, :]), float), (n, n))
     if not (np.all(np.isfinite(rates)) and np.all(rates >= 0) and np.allclose(rates, rates.T)):
         raise InputError("kernel: must give symmetric, finite rates of zero or more")
