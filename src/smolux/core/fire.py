@@ -96,8 +96,8 @@ def make_choose_process(
     """Bind the choice of the process of an encounter, of the first `pairs` ones.
 
     ``factor(r, t, q)`` is the rate of process `r` as a multiple of the kernel, `pair` that of the
-    method, and ``share(r, (i, j), q)`` the share of the encounters of two sizes in which process `r`
-    takes place; None if that is all of them. ``mixture(i, j, t, q)`` is the rate of two sizes as a
+    method, and ``share(r, (i, j), q)`` the share of the encounters of two sizes in which process
+    `r` takes place; None if that is all of them. ``mixture(i, j, t, q)`` is the rate of two sizes as a
     multiple of that by which they were drawn, if it varies in time.
     """
     if share is not None:
