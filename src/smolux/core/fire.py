@@ -97,8 +97,8 @@ def make_choose_process(
 
     ``factor(r, t, q)`` is the rate of process `r` as a multiple of the kernel, `pair` that of the
     method, and ``share(r, (i, j), q)`` the share of the encounters of two sizes in which process
-    `r` takes place; None if that is all of them. ``mixture(i, j, t, q)`` is the rate of two sizes as a
-    multiple of that by which they were drawn, if it varies in time.
+    `r` takes place; None if that is all of them. ``mixture(i, j, t, q)`` is the rate of two sizes
+    as a multiple of that by which they were drawn, if it varies in time.
     """
     if share is not None:
         choose = make_choose_process(pairs, factor, pair, None, mixture)
