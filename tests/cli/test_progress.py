@@ -82,12 +82,17 @@ def test_signals_of_others_are_left_alone():
     """As one guard within another is, and a program that handles them itself."""
     import signal
 
-    with Stopper(ALL) as outer, Stopper() as inner:
-        signal.raise_signal(signal.SIGINT)
-        assert (outer.requested, inner.requested) == ("SIGINT", "")
-        inner.check()
-        with pytest.raises(KeyboardInterrupt):
-            outer.check()
+    # in the background of a shell it is ignored, and is left so
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with Stopper(ALL) as outer, Stopper() as inner:
+            signal.raise_signal(signal.SIGINT)
+            assert (outer.requested, inner.requested) == ("SIGINT", "")
+            inner.check()
+            with pytest.raises(KeyboardInterrupt):
+                outer.check()
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.parametrize(

@@ -624,6 +624,7 @@ def test_other_kernels_do_not_vanish() -> None:
 DILUTION, WALL = 0.3, 0.9
 
 
+@extinction
 def test_two_removals_are_one_with_their_rates_together() -> None:
     """The number of particles of a small system by its master equation, and who took them."""
     particles, replicas, end = 12, 4000, 0.7
