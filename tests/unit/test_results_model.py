@@ -27,7 +27,7 @@ def there_and_back(model):
 @pytest.mark.parametrize("law", sx.kernels.KERNELS, ids=lambda law: law.name)
 def test_every_kernel(law):
     given = ARGUMENTS.get(law.name, {})
-    model = sx.Model(kernel=law(**given, scale=1 / 3))
+    model = sx.Model(kernel=law(**given) * (1 / 3))
     assert there_and_back(model) == model
 
 

@@ -23,6 +23,12 @@ from .reader import Problems, Table, dotted, show
 #: what the parameters of laws, processes and initial conditions measure; others are plain numbers
 FIELDS: dict[tuple[str, str], Dimension] = {
     ("kernel", "scale"): units.KERNEL,
+    ("kernel", "temperature"): units.TEMPERATURE,
+    ("kernel", "pressure"): units.PRESSURE,
+    ("kernel", "density"): units.MASS_DENSITY,
+    ("kernel", "monomer_diameter"): units.LENGTH,
+    ("kernel", "viscosity"): units.VISCOSITY,
+    ("kernel", "mean_free_path"): units.LENGTH,
     ("initial", "density"): units.NUMBER_DENSITY,
     ("initial", "densities"): units.NUMBER_DENSITY,
 }
@@ -346,8 +352,10 @@ def model_tables(model: Model, si: bool) -> dict[str, Any]:
     for law in laws:
         if law["name"] in ("formula", Sum.name):  # said by what else stands there
             del law["name"]
-        elif si and "scale" in law:
-            law["scale"] = units.text(law["scale"], units.KERNEL)
+        elif si:
+            for key in law:
+                if ("kernel", key) in FIELDS:
+                    law[key] = units.text(law[key], FIELDS["kernel", key])
     tables["processes"] = [_given(p) for p in data["processes"]]
     tables["initial"] = _initial_table(model.initial, data["initial"])
     if si:

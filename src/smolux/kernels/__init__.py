@@ -6,7 +6,9 @@ from .base import Kernel
 from .bilinear import Bilinear
 from .brownian import Brownian
 from .constant import Constant
+from .dahneke import Dahneke
 from .formula_kernel import FormulaKernel, formula
+from .fuchs import Fuchs
 from .function import FunctionKernel, from_function
 from .generalized_brownian import GeneralizedBrownian
 from .majorant import Majorant
@@ -29,6 +31,8 @@ KERNELS: tuple[type[Kernel], ...] = (
     GeneralizedBrownian,
     Shear,
     Sedimentation,
+    Fuchs,
+    Dahneke,
 )
 
 __all__ = [
@@ -38,7 +42,9 @@ __all__ = [
     "Bilinear",
     "Brownian",
     "Constant",
+    "Dahneke",
     "FormulaKernel",
+    "Fuchs",
     "FunctionKernel",
     "GeneralizedBrownian",
     "Kernel",
