@@ -15,7 +15,6 @@ from scipy import integrate
 from smolux import kernels
 from smolux.errors import InputError
 from smolux.kernels import KERNELS, Kernel
-from smolux.kernels.transition import Transition
 
 #: some units in the last place: NumPy, Python and processors differ by so much
 ROUNDING = 1e-14
@@ -24,7 +23,7 @@ quick = settings(max_examples=20, deadline=None, derandomize=True)
 
 #: every law, several with more than one set of parameters; a scale of one hides what lacks it
 LAWS: list[Kernel] = [
-    law(**law.example, scale=2.5) for law in KERNELS if not issubclass(law, Transition)
+    law(**law.example, scale=2.5) for law in KERNELS if "scale" in law.__dataclass_fields__
 ] + [
     kernels.Bilinear(0.0, 0.0, scale=3.0),
     kernels.Bilinear(2.0, 0.0, scale=0.1),
@@ -162,7 +161,7 @@ def test_registry() -> None:
     names = [law.name for law in KERNELS]
     assert names == [
         "constant", "additive", "multiplicative", "bilinear", "product", "ballistic", "brownian",
-        "generalized-brownian", "shear", "sedimentation", "fuchs", "dahneke",
+        "generalized-brownian", "shear", "sedimentation", "fuchs", "dahneke", "long",
     ]  # fmt: skip
     assert {law.name for law in KERNELS if law.exact} == set(names[:4])
     assert {law.name for law in KERNELS if law.cheap} == set(names[:4])
@@ -265,6 +264,17 @@ def test_shear_in_si_units() -> None:
     # Gradient 10 1/s, spheres of 1 µm radius: (4/3) G (2 r)**3 = 1.0667e-16 m³/s
     law = kernels.Shear.laminar(10.0, 4 / 3 * math.pi * 1e-18)
     assert float(law(1, 1)) == close(4 / 3 * 10 * 8e-18, rel=1e-13)
+
+
+def test_turbulent_shear_in_si_units() -> None:
+    # Jacobson 2005, figure 15.7: 298 K, 1e5 Pa, 5e-4 m²/s³, radii of 10 µm and 20.08 nm, 5.228 µm
+    viscosity, density = 1.8415e-5, 1e5 * 0.0289647 / (8.314462618 * 298)
+    law = kernels.Shear.turbulent(5e-4, viscosity, density, 4 / 3 * math.pi * 1e-24)
+    for radius, expected, read in ((20.08e-9, 7.34e-9, 6.70e-9), (5.228e-6, 2.575e-8, 2.51e-8)):
+        found = float(law((10e-6 / 1e-8) ** 3, (radius / 1e-8) ** 3)) * 1e6  # cm³/s
+        assert found == close(expected, rel=5e-3)
+        assert found == close(read, rel=0.1)
+    assert law.scale / 1e-24 == close(1.2944 * math.sqrt(5e-4 * density / viscosity), rel=1e-4)
 
 
 def test_sedimentation_in_si_units() -> None:

@@ -9,6 +9,7 @@ from smolux.model_dict import model_from_dict, model_to_dict
 
 ARGUMENTS = {
     "bilinear": {"A": 0.5, "B": 0.25},
+    "long": {"monomer_diameter": 4e-6},
     "product": {"mu": 0.4},
     "generalized-brownian": {"a": 0.95},
 }

@@ -117,10 +117,12 @@ def _law(table: Table) -> tuple[dict[str, Any], str]:
     if constructor:
         return _constructed(table, law, constructor)
     own = {f.name: f.default for f in fields(law)}
-    for constructor in law.constructors:  # the name alone will do, if the keys tell
-        arguments = _signature(law, constructor)
-        if any(a in table and a not in own for a in arguments):
-            return _constructed(table, law, constructor)
+    # the name alone will do, if the keys tell
+    told = {
+        c: sum(a in table and a not in own for a in _signature(law, c)) for c in law.constructors
+    }
+    if any(told.values()):
+        return _constructed(table, law, max(told, key=lambda c: told[c]))
     data = {"name": name, **_fields(table, "kernel", own)}
     # what else could have stood here
     table.known += [a for c in law.constructors for a in _signature(law, c)]

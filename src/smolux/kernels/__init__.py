@@ -11,6 +11,7 @@ from .formula_kernel import FormulaKernel, formula
 from .fuchs import Fuchs
 from .function import FunctionKernel, from_function
 from .generalized_brownian import GeneralizedBrownian
+from .long import Long
 from .majorant import Majorant
 from .multiplicative import Multiplicative
 from .product import Product
@@ -33,6 +34,7 @@ KERNELS: tuple[type[Kernel], ...] = (
     Sedimentation,
     Fuchs,
     Dahneke,
+    Long,
 )
 
 __all__ = [
@@ -48,6 +50,7 @@ __all__ = [
     "FunctionKernel",
     "GeneralizedBrownian",
     "Kernel",
+    "Long",
     "Majorant",
     "Multiplicative",
     "Product",
