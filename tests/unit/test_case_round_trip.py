@@ -23,7 +23,8 @@ from smolux.units import of_arguments
 KERNEL = {
     "scale": (1, 0.25), "A": (1,), "B": (0.5,), "mu": (0.4, 1), "dimension": (3, 1.8), "a": (0.9,),
     "temperature": (310,), "pressure": (9e4,), "density": (1800,), "monomer_diameter": (1e-9,),
-    "prefactor": (1.3,), "viscosity": (1.8e-5,), "mean_free_path": (7e-8,), "slip_a": (1.257,),
+    "prefactor": (1.3,), "viscosity": (1.8e-5,), "mean_free_path": (7e-8,),
+    "exponent": (0.5,), "stability": (100,), "slip_a": (1.257,),
     "slip_b": (0.4,), "slip_c": (1.1,),
 }  # fmt: skip
 OF_TIME, OF_SIZE, OF_PAIR = (0.5, "0.1*exp(-t)"), (1, "k**(1/3)", [0.1, 0.2]), (0.1, "1/(i*j)")
@@ -145,7 +146,7 @@ def test_arguments_of_constructors_say_what_they_measure():
             make = getattr(kernel, constructor)
             measured = of_arguments(make)
             plain = set(inspect.signature(make).parameters) - set(measured)
-            assert plain <= {"dimension"}
+            assert plain <= {"dimension", "exponent", "stability"}
             for name, dimension in measured.items():
                 text = inspect.getdoc(make).partition(f"\n{name} : float")[2].partition(" : ")[0]
                 unit = dimension.unit.replace("*", " ").replace("^2", "²").replace("^3", "³")

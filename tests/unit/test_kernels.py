@@ -33,6 +33,8 @@ LAWS: list[Kernel] = [
     kernels.GeneralizedBrownian(-0.3, scale=0.3),
     kernels.GeneralizedBrownian(2.0, scale=3.0),
     kernels.Sedimentation(1e-17),
+    kernels.Clusters(2.1, 0.25, 30.0, scale=3.0),
+    kernels.Clusters(2.1, 0.6, 1e6, scale=3.0),
 ]
 every_law = pytest.mark.parametrize("law", LAWS, ids=repr)
 
@@ -136,7 +138,7 @@ def test_factors(law: Kernel) -> None:
     found = law.factors(sizes)
     ranks = {
         "constant": 1, "additive": 2, "multiplicative": 1, "bilinear": 2, "product": 1,
-        "brownian": 3, "generalized-brownian": 2, "shear": 4,
+        "brownian": 3, "generalized-brownian": 2, "shear": 4, "clusters": 3,
     }  # fmt: skip
     if law.name not in ranks:
         assert found is None
@@ -161,7 +163,7 @@ def test_registry() -> None:
     names = [law.name for law in KERNELS]
     assert names == [
         "constant", "additive", "multiplicative", "bilinear", "product", "ballistic", "brownian",
-        "generalized-brownian", "shear", "sedimentation", "fuchs", "dahneke", "long",
+        "generalized-brownian", "shear", "sedimentation", "fuchs", "dahneke", "long", "clusters",
     ]  # fmt: skip
     assert {law.name for law in KERNELS if law.exact} == set(names[:4])
     assert {law.name for law in KERNELS if law.cheap} == set(names[:4])
@@ -248,6 +250,19 @@ def test_brownian_in_si_units() -> None:
     diffusivity = K_B * 293.15 / (6 * math.pi * 1.82e-5 * radius)
     assert float(law(2, 5)) == close(4 * math.pi * diffusivity.sum() * radius.sum())
     assert kernels.Brownian.continuum(293.15, 1.82e-5, 1.8).dimension == 1.8
+
+
+def test_clusters() -> None:
+    limited = kernels.Clusters.in_fluid(293.15, 1.82e-5)
+    assert float(limited(3, 50)) == close(
+        float(kernels.Brownian.continuum(293.15, 1.82e-5, 1.8)(3, 50)), rel=1e-14
+    )
+    slow = kernels.Clusters.in_fluid(293.15, 1.82e-5, stability=1e5, exponent=0.5, dimension=2.1)
+    assert float(slow(1, 1)) == close(float(limited(1, 1)) / 1e5, rel=1e-14)
+    assert float(slow(4, 9)) == close(float(slow(1, 2.25)) * 4, rel=1e-13)
+    assert (slow.degree, slow.gels) == (1.0, False)
+    assert kernels.Clusters(1.8, 0.5).gel_time() == 0.0
+    assert (kernels.Clusters(4.0, 0.6).gels, kernels.Clusters(4.0, 0.6).gel_time()) == (True, None)
 
 
 def test_ballistic_in_si_units() -> None:

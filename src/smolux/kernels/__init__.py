@@ -5,6 +5,7 @@ from .ballistic import Ballistic
 from .base import Kernel
 from .bilinear import Bilinear
 from .brownian import Brownian
+from .clusters import Clusters
 from .constant import Constant
 from .dahneke import Dahneke
 from .formula_kernel import FormulaKernel, formula
@@ -35,6 +36,7 @@ KERNELS: tuple[type[Kernel], ...] = (
     Fuchs,
     Dahneke,
     Long,
+    Clusters,
 )
 
 __all__ = [
@@ -43,6 +45,7 @@ __all__ = [
     "Ballistic",
     "Bilinear",
     "Brownian",
+    "Clusters",
     "Constant",
     "Dahneke",
     "FormulaKernel",

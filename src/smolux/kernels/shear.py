@@ -84,7 +84,8 @@ class Shear(Kernel):
         Notes
         -----
         Of particles that follow the fluid and are smaller than its smallest eddies: P. G. Saffman
-        and J. S. Turner, J. Fluid Mech. 1, 16 (1956), doi:10.1017/S0022112056000020.
+        and J. S. Turner, J. Fluid Mech. 1, 16 (1956), doi:10.1017/S0022112056000020. It was found
+        for radii that differ by a factor of two at most.
         Every pair on a collision course is taken to meet (collision efficiency 1).
         """
         check_positive(
