@@ -55,6 +55,7 @@ NONE = Dimension("a plain number", "", "0.5")
 Length = Annotated[float, LENGTH]
 Volume = Annotated[float, VOLUME]
 MassDensity = Annotated[float, MASS_DENSITY]
+CollisionRate = Annotated[float, KERNEL]
 Temperature = Annotated[float, TEMPERATURE]
 Pressure = Annotated[float, PRESSURE]
 Viscosity = Annotated[float, VISCOSITY]

@@ -146,7 +146,7 @@ def test_arguments_of_constructors_say_what_they_measure():
             make = getattr(kernel, constructor)
             measured = of_arguments(make)
             plain = set(inspect.signature(make).parameters) - set(measured)
-            assert plain <= {"dimension", "exponent", "stability"}
+            assert plain <= {"dimension", "exponent", "stability", "functionality"}
             for name, dimension in measured.items():
                 text = inspect.getdoc(make).partition(f"\n{name} : float")[2].partition(" : ")[0]
                 unit = dimension.unit.replace("*", " ").replace("^2", "²").replace("^3", "³")

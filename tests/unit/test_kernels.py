@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
 
-from smolux import kernels
+from smolux import exact, kernels
 from smolux.errors import InputError
 from smolux.kernels import KERNELS, Kernel
 
@@ -230,6 +230,22 @@ def test_gel_time_of_the_bilinear_kernel(A: float, B: float) -> None:
 def test_gel_time_of_the_bilinear_kernel_in_closed_form() -> None:
     assert kernels.Bilinear(0.5, 0.25).gel_time() == pytest.approx(4 / 3, rel=1e-14)
     assert kernels.Bilinear(1.0, 0.0).gel_time() is None
+
+
+def test_functional_monomers() -> None:
+    """Stockmayer 1943: ``t = 1/(f (f-2))``; and the number there, ``(f-2)/(2 (f-1))``."""
+    for f in (3.0, 4.0, 7.0):
+        law = kernels.Bilinear.functional(0.5, f)
+        assert float(law(3, 5)) == pytest.approx(0.5 * ((f - 2) * 3 + 2) * ((f - 2) * 5 + 2))
+        assert law.gel_time() == pytest.approx(2 / (f * (f - 2)), rel=1e-12)
+        t = law.gel_time() * np.array([0.5, 1.0 - 1e-12])
+        number = (f / (1 + f * t / 2) - (f - 2)) / 2
+        assert number[1] == pytest.approx((f - 2) / (2 * (f - 1)))
+        found = exact.Bilinear(A=law.A, B=law.B, scale=law.scale).moment(t, 0)
+        np.testing.assert_allclose(found, number, rtol=1e-9)
+    assert kernels.Bilinear.functional(1.0, 2.0) == kernels.Bilinear(0.0, 0.0, 4.0)
+    with pytest.raises(InputError, match=r"functionality = 1\.5: must be from 2"):
+        kernels.Bilinear.functional(1.0, 1.5)
 
 
 K_B = 1.380649e-23
