@@ -9,6 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from smolux.content import frozen
+
 from .transition import Transition, mobility, width
 
 
@@ -67,4 +69,4 @@ class Dahneke(Transition):
         "x = 4*(Di + Dj)/(d*sqrt(ci**2 + cj**2))"
     )
     reference: ClassVar[str] = "B. Dahneke, in: Theory of Dispersed Multiphase Flow (1983), 97-133"
-    rate: ClassVar[Callable[..., Any]] = staticmethod(_rate)
+    rate: ClassVar[Callable[..., Any]] = staticmethod(frozen(_rate))  # with what it calls

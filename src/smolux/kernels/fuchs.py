@@ -9,6 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from smolux.content import frozen
+
 from .transition import Transition, mobility, width
 
 
@@ -86,4 +88,4 @@ class Fuchs(Transition):
         "g = sqrt(gi**2 + gj**2), c = sqrt(ci**2 + cj**2)"
     )
     reference: ClassVar[str] = "N. A. Fuchs, The Mechanics of Aerosols (Pergamon, 1964), section 49"
-    rate: ClassVar[Callable[..., Any]] = staticmethod(_rate)
+    rate: ClassVar[Callable[..., Any]] = staticmethod(frozen(_rate))  # with what it calls
