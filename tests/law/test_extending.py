@@ -44,8 +44,8 @@ def test_a_law_with_branches_is_known_to_be_sampled_only() -> None:
 
     assert not Branched().rigorous
     assert float(Branched().bounds(1, 9, 1, 9)[1]) >= 2.0
-    # those of the package state their own
-    assert all("bounds" in vars(k) for k in sx.kernels.KERNELS if k.name != "formula")
+    # those of the package state their own, or have proved ones of their rate
+    assert all(k(**k.example).rigorous for k in sx.kernels.KERNELS)
 
 
 def test_the_start_is_drawn_and_solved_alike() -> None:

@@ -22,6 +22,10 @@ from smolux.units import of_arguments
 #: values for every key of a table; a key of a new law, process or setting belongs here
 KERNEL = {
     "scale": (1, 0.25), "A": (1,), "B": (0.5,), "mu": (0.4, 1), "dimension": (3, 1.8), "a": (0.9,),
+    "temperature": (310,), "pressure": (9e4,), "density": (1800,), "monomer_diameter": (1e-9,),
+    "prefactor": (1.3,), "viscosity": (1.8e-5,), "mean_free_path": (7e-8,),
+    "exponent": (0.5,), "stability": (100,), "slip_a": (1.257,),
+    "slip_b": (0.4,), "slip_c": (1.1,),
 }  # fmt: skip
 OF_TIME, OF_SIZE, OF_PAIR = (0.5, "0.1*exp(-t)"), (1, "k**(1/3)", [0.1, 0.2]), (0.1, "1/(i*j)")
 PROCESS = {
@@ -58,7 +62,14 @@ SETTINGS = {
     # one goes with the other
     "weighting": ("mass-flow", "auto"), "exponent": (), "address": (),
 }  # fmt: skip
-UNITS = {"scale": "1e-9 cm^3/s", "density": "1e6 cm^-3"}
+UNITS = {
+    "scale": "1e-9 cm^3/s", "density": "1e6 cm^-3", "temperature": "25 degC", "pressure": "1 bar",
+    "monomer_diameter": "3 nm", "viscosity": "18 uPa s", "mean_free_path": "70 nm",
+}  # fmt: skip
+
+
+def _with_unit(section, name):
+    return "1.8 g/cm^3" if (section, name) == ("kernel", "density") else UNITS[name]
 
 
 def drawn(draw, kind, values, si_section=None):
@@ -69,7 +80,9 @@ def drawn(draw, kind, values, si_section=None):
         needed = f.default is MISSING and f.default_factory is MISSING
         measured = (si_section, f.name) in FIELDS
         if given_ and (needed or measured or draw(st.booleans())):
-            table[f.name] = UNITS[f.name] if measured else draw(st.sampled_from(given_))
+            table[f.name] = (
+                _with_unit(si_section, f.name) if measured else draw(st.sampled_from(given_))
+            )
     return table
 
 
@@ -133,7 +146,7 @@ def test_arguments_of_constructors_say_what_they_measure():
             make = getattr(kernel, constructor)
             measured = of_arguments(make)
             plain = set(inspect.signature(make).parameters) - set(measured)
-            assert plain <= {"dimension"}
+            assert plain <= {"dimension", "exponent", "stability", "functionality"}
             for name, dimension in measured.items():
                 text = inspect.getdoc(make).partition(f"\n{name} : float")[2].partition(" : ")[0]
                 unit = dimension.unit.replace("*", " ").replace("^2", "²").replace("^3", "³")

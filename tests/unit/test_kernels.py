@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
 
-from smolux import kernels
+from smolux import exact, kernels
 from smolux.errors import InputError
 from smolux.kernels import KERNELS, Kernel
 
@@ -22,7 +22,9 @@ ROUNDING = 1e-14
 quick = settings(max_examples=20, deadline=None, derandomize=True)
 
 #: every law, several with more than one set of parameters; a scale of one hides what lacks it
-LAWS: list[Kernel] = [law(**law.example, scale=2.5) for law in KERNELS] + [
+LAWS: list[Kernel] = [
+    law(**law.example, scale=2.5) for law in KERNELS if "scale" in law.__dataclass_fields__
+] + [
     kernels.Bilinear(0.0, 0.0, scale=3.0),
     kernels.Bilinear(2.0, 0.0, scale=0.1),
     kernels.Product(-0.7, scale=0.3),
@@ -31,6 +33,8 @@ LAWS: list[Kernel] = [law(**law.example, scale=2.5) for law in KERNELS] + [
     kernels.GeneralizedBrownian(-0.3, scale=0.3),
     kernels.GeneralizedBrownian(2.0, scale=3.0),
     kernels.Sedimentation(1e-17),
+    kernels.Clusters(2.1, 0.25, 30.0, scale=3.0),
+    kernels.Clusters(2.1, 0.6, 1e6, scale=3.0),
 ]
 every_law = pytest.mark.parametrize("law", LAWS, ids=repr)
 
@@ -134,7 +138,7 @@ def test_factors(law: Kernel) -> None:
     found = law.factors(sizes)
     ranks = {
         "constant": 1, "additive": 2, "multiplicative": 1, "bilinear": 2, "product": 1,
-        "brownian": 3, "generalized-brownian": 2, "shear": 4,
+        "brownian": 3, "generalized-brownian": 2, "shear": 4, "clusters": 3,
     }  # fmt: skip
     if law.name not in ranks:
         assert found is None
@@ -159,7 +163,7 @@ def test_registry() -> None:
     names = [law.name for law in KERNELS]
     assert names == [
         "constant", "additive", "multiplicative", "bilinear", "product", "ballistic", "brownian",
-        "generalized-brownian", "shear", "sedimentation",
+        "generalized-brownian", "shear", "sedimentation", "fuchs", "dahneke", "long", "clusters",
     ]  # fmt: skip
     assert {law.name for law in KERNELS if law.exact} == set(names[:4])
     assert {law.name for law in KERNELS if law.cheap} == set(names[:4])
@@ -228,6 +232,22 @@ def test_gel_time_of_the_bilinear_kernel_in_closed_form() -> None:
     assert kernels.Bilinear(1.0, 0.0).gel_time() is None
 
 
+def test_functional_monomers() -> None:
+    """Stockmayer 1943: ``t = 1/(f (f-2))``; and the number there, ``(f-2)/(2 (f-1))``."""
+    for f in (3.0, 4.0, 7.0):
+        law = kernels.Bilinear.functional(0.5, f)
+        assert float(law(3, 5)) == pytest.approx(0.5 * ((f - 2) * 3 + 2) * ((f - 2) * 5 + 2))
+        assert law.gel_time() == pytest.approx(2 / (f * (f - 2)), rel=1e-12)
+        t = law.gel_time() * np.array([0.5, 1.0 - 1e-12])
+        number = (f / (1 + f * t / 2) - (f - 2)) / 2
+        assert number[1] == pytest.approx((f - 2) / (2 * (f - 1)))
+        found = exact.Bilinear(A=law.A, B=law.B, scale=law.scale).moment(t, 0)
+        np.testing.assert_allclose(found, number, rtol=1e-9)
+    assert kernels.Bilinear.functional(1.0, 2.0) == kernels.Bilinear(0.0, 0.0, 4.0)
+    with pytest.raises(InputError, match=r"functionality = 1\.5: must be from 2"):
+        kernels.Bilinear.functional(1.0, 1.5)
+
+
 K_B = 1.380649e-23
 
 
@@ -248,6 +268,19 @@ def test_brownian_in_si_units() -> None:
     assert kernels.Brownian.continuum(293.15, 1.82e-5, 1.8).dimension == 1.8
 
 
+def test_clusters() -> None:
+    limited = kernels.Clusters.in_fluid(293.15, 1.82e-5)
+    assert float(limited(3, 50)) == close(
+        float(kernels.Brownian.continuum(293.15, 1.82e-5, 1.8)(3, 50)), rel=1e-14
+    )
+    slow = kernels.Clusters.in_fluid(293.15, 1.82e-5, stability=1e5, exponent=0.5, dimension=2.1)
+    assert float(slow(1, 1)) == close(float(limited(1, 1)) / 1e5, rel=1e-14)
+    assert float(slow(4, 9)) == close(float(slow(1, 2.25)) * 4, rel=1e-13)
+    assert (slow.degree, slow.gels) == (1.0, False)
+    assert kernels.Clusters(1.8, 0.5).gel_time() == 0.0
+    assert (kernels.Clusters(4.0, 0.6).gels, kernels.Clusters(4.0, 0.6).gel_time()) == (True, None)
+
+
 def test_ballistic_in_si_units() -> None:
     # Cross section times mean relative speed, from masses and radii
     temperature, density, volume = 300.0, 2200.0, 4e-27
@@ -262,6 +295,17 @@ def test_shear_in_si_units() -> None:
     # Gradient 10 1/s, spheres of 1 µm radius: (4/3) G (2 r)**3 = 1.0667e-16 m³/s
     law = kernels.Shear.laminar(10.0, 4 / 3 * math.pi * 1e-18)
     assert float(law(1, 1)) == close(4 / 3 * 10 * 8e-18, rel=1e-13)
+
+
+def test_turbulent_shear_in_si_units() -> None:
+    # Jacobson 2005, figure 15.7: 298 K, 1e5 Pa, 5e-4 m²/s³, radii of 10 µm and 20.08 nm, 5.228 µm
+    viscosity, density = 1.8415e-5, 1e5 * 0.0289647 / (8.314462618 * 298)
+    law = kernels.Shear.turbulent(5e-4, viscosity, density, 4 / 3 * math.pi * 1e-24)
+    for radius, expected, read in ((20.08e-9, 7.34e-9, 6.70e-9), (5.228e-6, 2.575e-8, 2.51e-8)):
+        found = float(law((10e-6 / 1e-8) ** 3, (radius / 1e-8) ** 3)) * 1e6  # cm³/s
+        assert found == close(expected, rel=5e-3)
+        assert found == close(read, rel=0.1)
+    assert law.scale / 1e-24 == close(1.2944 * math.sqrt(5e-4 * density / viscosity), rel=1e-4)
 
 
 def test_sedimentation_in_si_units() -> None:

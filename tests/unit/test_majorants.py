@@ -16,10 +16,11 @@ from smolux.weighting import Number
 
 #: no scale is one, which hides what lacks it
 LAWS = [
-    *(law(**law.example, scale=2.5) for law in KERNELS),
+    *(law(**law.example, scale=2.5) for law in KERNELS if "scale" in law.__dataclass_fields__),
     sx.kernels.Bilinear(0.0, 0.3, scale=0.3),
     sx.kernels.Product(-1.5, scale=3.0),
     sx.kernels.Brownian(1.8, scale=1e-16),
+    sx.kernels.Clusters(2.1, 0.3, 40.0, scale=0.3),
     sx.kernels.GeneralizedBrownian(-0.4, scale=3.0),
 ]
 every_law = pytest.mark.parametrize("law", LAWS, ids=repr)

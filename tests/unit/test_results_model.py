@@ -9,6 +9,7 @@ from smolux.model_dict import model_from_dict, model_to_dict
 
 ARGUMENTS = {
     "bilinear": {"A": 0.5, "B": 0.25},
+    "long": {"monomer_diameter": 4e-6},
     "product": {"mu": 0.4},
     "generalized-brownian": {"a": 0.95},
 }
@@ -27,7 +28,7 @@ def there_and_back(model):
 @pytest.mark.parametrize("law", sx.kernels.KERNELS, ids=lambda law: law.name)
 def test_every_kernel(law):
     given = ARGUMENTS.get(law.name, {})
-    model = sx.Model(kernel=law(**given, scale=1 / 3))
+    model = sx.Model(kernel=law(**given) * (1 / 3))
     assert there_and_back(model) == model
 
 

@@ -23,6 +23,12 @@ from .reader import Problems, Table, dotted, show
 #: what the parameters of laws, processes and initial conditions measure; others are plain numbers
 FIELDS: dict[tuple[str, str], Dimension] = {
     ("kernel", "scale"): units.KERNEL,
+    ("kernel", "temperature"): units.TEMPERATURE,
+    ("kernel", "pressure"): units.PRESSURE,
+    ("kernel", "density"): units.MASS_DENSITY,
+    ("kernel", "monomer_diameter"): units.LENGTH,
+    ("kernel", "viscosity"): units.VISCOSITY,
+    ("kernel", "mean_free_path"): units.LENGTH,
     ("initial", "density"): units.NUMBER_DENSITY,
     ("initial", "densities"): units.NUMBER_DENSITY,
 }
@@ -111,10 +117,12 @@ def _law(table: Table) -> tuple[dict[str, Any], str]:
     if constructor:
         return _constructed(table, law, constructor)
     own = {f.name: f.default for f in fields(law)}
-    for constructor in law.constructors:  # the name alone will do, if the keys tell
-        arguments = _signature(law, constructor)
-        if any(a in table and a not in own for a in arguments):
-            return _constructed(table, law, constructor)
+    # the name alone will do, if the keys tell
+    told = {
+        c: sum(a in table and a not in own for a in _signature(law, c)) for c in law.constructors
+    }
+    if any(told.values()):
+        return _constructed(table, law, max(told, key=lambda c: told[c]))
     data = {"name": name, **_fields(table, "kernel", own)}
     # what else could have stood here
     table.known += [a for c in law.constructors for a in _signature(law, c)]
@@ -346,8 +354,10 @@ def model_tables(model: Model, si: bool) -> dict[str, Any]:
     for law in laws:
         if law["name"] in ("formula", Sum.name):  # said by what else stands there
             del law["name"]
-        elif si and "scale" in law:
-            law["scale"] = units.text(law["scale"], units.KERNEL)
+        elif si:
+            for key in law:
+                if ("kernel", key) in FIELDS:
+                    law[key] = units.text(law[key], FIELDS["kernel", key])
     tables["processes"] = [_given(p) for p in data["processes"]]
     tables["initial"] = _initial_table(model.initial, data["initial"])
     if si:

@@ -81,7 +81,8 @@ def details(name: str) -> str:
     ]
     for f in fields(law):
         value = law.example.get(f.name, 1.0 if f.default is MISSING else f.default)
-        lines.append(f"    {f.name} = {value!r}")
+        if value is not None:
+            lines.append(f"    {f.name} = {value!r}")
     for constructor in law.constructors:
         lines += ["", *_physical(law, constructor)]
     return "\n".join(lines)

@@ -5,10 +5,14 @@ from .ballistic import Ballistic
 from .base import Kernel
 from .bilinear import Bilinear
 from .brownian import Brownian
+from .clusters import Clusters
 from .constant import Constant
+from .dahneke import Dahneke
 from .formula_kernel import FormulaKernel, formula
+from .fuchs import Fuchs
 from .function import FunctionKernel, from_function
 from .generalized_brownian import GeneralizedBrownian
+from .long import Long
 from .majorant import Majorant
 from .multiplicative import Multiplicative
 from .product import Product
@@ -29,6 +33,10 @@ KERNELS: tuple[type[Kernel], ...] = (
     GeneralizedBrownian,
     Shear,
     Sedimentation,
+    Fuchs,
+    Dahneke,
+    Long,
+    Clusters,
 )
 
 __all__ = [
@@ -37,11 +45,15 @@ __all__ = [
     "Ballistic",
     "Bilinear",
     "Brownian",
+    "Clusters",
     "Constant",
+    "Dahneke",
     "FormulaKernel",
+    "Fuchs",
     "FunctionKernel",
     "GeneralizedBrownian",
     "Kernel",
+    "Long",
     "Majorant",
     "Multiplicative",
     "Product",

@@ -88,6 +88,11 @@ class Kernel:
         return ()
 
     @property
+    def monomer(self) -> dict[str, float]:
+        """What the law says of the monomer, in SI units; nothing if it knows none."""
+        return {}
+
+    @property
     def label(self) -> str:
         """What messages call the law."""
         return repr(self.name)

@@ -10,7 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .base import Float, Kernel, check_parameters, corners
+from smolux.checks import is_number
+from smolux.errors import InputError, Problem
+from smolux.units import CollisionRate
+
+from .base import Float, Kernel, check_parameters, check_positive, corners
 from .majorant import Majorant
 
 
@@ -40,6 +44,7 @@ class Bilinear(Kernel):
     name: ClassVar[str] = "bilinear"
     formula: ClassVar[str] = "scale * (1 + A*(i + j) + B*(i*j))"
     reference: ClassVar[str] = "J. L. Spouge, J. Phys. A 16, 767 (1983)"
+    constructors: ClassVar[tuple[str, ...]] = ("functional",)
     cheap: ClassVar[bool] = True
     exact: ClassVar[str | None] = "bilinear"
     example: ClassVar[dict[str, float]] = {"A": 0.3, "B": 0.2}
@@ -48,6 +53,31 @@ class Bilinear(Kernel):
     def __post_init__(self) -> None:
         # Below 1e100 nothing overflows for sizes up to 2**62.
         check_parameters(self, A=(0.0, 1e100), B=(0.0, 1e100))
+
+    @classmethod
+    def functional(cls, groups: CollisionRate, functionality: float = 3.0) -> Bilinear:
+        """Monomers of f equal groups that react alike, ``K = groups ((f-2) i + 2)((f-2) j + 2)``.
+
+        Parameters
+        ----------
+        groups : float
+            Rate at which two groups react, in m³/s.
+        functionality : float
+            Number of groups f of a monomer, at least 2.
+
+        Notes
+        -----
+        The polymers are trees without rings, RA_f; from monomers of density n they gel at
+        ``1/(groups n f (f - 2))``. After that the law, solved or simulated, holds no bonds within
+        the gel: its sol is smaller than that of Flory, who counts them. W. H. Stockmayer, J. Chem.
+        Phys. 11, 45 (1943), doi:10.1063/1.1723803.
+        """
+        check_positive("Bilinear.functional", groups=groups)
+        if not (is_number(functionality) and 2.0 <= functionality <= 1e6):
+            where = f"Bilinear.functional: functionality = {functionality!r}"
+            raise InputError([Problem.at(f"{where}: must be from 2 to 1e6", "functionality")])
+        more = 0.5 * (functionality - 2.0)
+        return cls(more, more * more, 4.0 * groups)
 
     @property
     def degree(self) -> float | None:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smolux.units import Rate, Volume
+from smolux.units import Dissipation, MassDensity, Rate, Viscosity, Volume
 
 from .base import Float, Kernel, check_parameters, check_positive, corners
 from .majorant import Majorant
@@ -39,7 +39,7 @@ class Shear(Kernel):
     name: ClassVar[str] = "shear"
     formula: ClassVar[str] = "scale * (cbrt(i) + cbrt(j))**3"
     reference: ClassVar[str] = "M. v. Smoluchowski, Z. Phys. Chem. 92, 129 (1917)"
-    constructors: ClassVar[tuple[str, ...]] = ("laminar",)
+    constructors: ClassVar[tuple[str, ...]] = ("laminar", "turbulent")
     rate: ClassVar[Callable[..., Any]] = staticmethod(_rate)
 
     def __post_init__(self) -> None:
@@ -63,6 +63,40 @@ class Shear(Kernel):
         """
         check_positive("Shear.laminar", gradient=gradient, volume=volume)
         return cls(gradient * volume / math.pi)
+
+    @classmethod
+    def turbulent(
+        cls, dissipation: Dissipation, viscosity: Viscosity, density: MassDensity, volume: Volume
+    ) -> Shear:
+        """Rate in turbulence, ``K = sqrt(8 pi e/(15 nu)) (r_i + r_j)^3``, in m³/s.
+
+        Parameters
+        ----------
+        dissipation : float
+            Of kinetic energy, e, in m²/s³.
+        viscosity : float
+            Dynamic viscosity of the fluid, in Pa s.
+        density : float
+            Of the fluid, in kg/m³, so that ``nu = viscosity/density``.
+        volume : float
+            Volume of the monomer, a sphere, in m³.
+
+        Notes
+        -----
+        Of particles that follow the fluid and are smaller than its smallest eddies: P. G. Saffman
+        and J. S. Turner, J. Fluid Mech. 1, 16 (1956), doi:10.1017/S0022112056000020. It was found
+        for radii that differ by a factor of two at most.
+        Every pair on a collision course is taken to meet (collision efficiency 1).
+        """
+        check_positive(
+            "Shear.turbulent",
+            dissipation=dissipation,
+            viscosity=viscosity,
+            density=density,
+            volume=volume,
+        )
+        gradient = math.sqrt(8.0 * math.pi * dissipation * density / (15.0 * viscosity))
+        return cls(gradient * 3.0 * volume / (4.0 * math.pi))
 
     @property
     def degree(self) -> float:

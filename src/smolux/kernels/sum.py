@@ -73,6 +73,7 @@ class Sum(MadeOfKernels):
         flat: list[tuple[float, Kernel]] = []
         for number, term in zip(numbers, terms, strict=True):
             flat += [(float(number) * each, kernel) for each, kernel in term.parts]
+        _check_monomers([kernel for _, kernel in flat])
         object.__setattr__(self, "terms", tuple(kernel for _, kernel in flat))
         object.__setattr__(self, "coefficients", tuple(number for number, _ in flat))
 
@@ -193,6 +194,19 @@ class Sum(MadeOfKernels):
             "degree": self.degree,
             "gels": self.gels,
         }
+
+
+def _check_monomers(terms: Sequence[Kernel]) -> None:
+    """Check that the terms mean the same particles by a size."""
+    known: dict[str, tuple[float, Kernel]] = {}
+    for kernel in terms:
+        for key, value in kernel.monomer.items():
+            before, other = known.setdefault(key, (value, kernel))
+            if abs(before - value) > 1e-9 * before:
+                raise InputError(
+                    f"sum of kernels: {key} = {before:g} of {other.label} and {value:g} of "
+                    f"{kernel.label}: the monomers differ; give all terms the same"
+                )
 
 
 def _term(coefficient: float, table: dict[str, Any]) -> dict[str, Any]:
