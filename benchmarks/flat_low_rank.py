@@ -19,15 +19,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numba
 import numpy as np
+from smolux.methods.low_rank.method.majorants import from_powers
+from smolux.methods.low_rank.method.segment_tree import levels_of
 
 import smolux as sx
 from benchmarks.common import group_of, interleaved, loop_seconds, model, table, write_section
 from benchmarks.flat import stream
 from smolux.core import rng
-from smolux.core.segment_tree import levels_of
 from smolux.core.slots import slot_edges, slot_of
 from smolux.core.state import TRIALS
-from smolux.methods.majorants import from_powers
 
 _BITS = 6
 _COUNTED = 2 << _BITS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .methods import AcceptanceRejection, Method, SizeClass
-from .methods.auto import Circumstances, choose, costs, unforeseen
+from .methods.choose import Circumstances, choose, costs, unforeseen
 from .plan import Plan
 from .processes.base import PairProcess
 

@@ -334,7 +334,7 @@ def _bad_share(name: str, share: Kernel, state: State, r: int) -> str:
 
 def _bad_rate(model: Model, state: State, r: int) -> str:
     i, j = int(state.count[r, WORST_I]), int(state.count[r, WORST_J])
-    if i == j == 0:  # of all particles together, see `smolux.methods.inverse_pieces`
+    if i == j == 0:  # of all particles together, see `smolux.methods.inverse.method.pieces`
         return (
             f"the rates of the kernel {model.kernel.label} of all pairs have no finite sum at "
             f"t = {state.clock[r, TIME]:.6g}: take a longer unit of time, in which rates are "

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from smolux.core import alias
 from smolux.core.rng import bits, streams
+from smolux.methods.size_class.method import alias
 
 
 @numba.njit

@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from smolux.methods.low_rank.method.segment_tree import (
+    FANOUT,
+    add,
+    build,
+    find,
+    find_mixed,
+    levels_of,
+)
 
-from smolux.core.segment_tree import FANOUT, add, build, find, find_mixed, levels_of
 from smolux.core.slots import octave, slot_edges, slot_of
 
 _build = numba.njit(lambda tree, levels, row: build(tree, levels, row))

@@ -17,7 +17,7 @@ from smolux.errors import InputError
 from smolux.exact import finite
 from smolux.exact.find import solution
 from smolux.kernels import Sum, from_dict
-from smolux.methods.auto import unforeseen
+from smolux.methods.choose import unforeseen
 from smolux.planning import make_plan
 from smolux.replicas import Group
 from smolux.windows import windows_for

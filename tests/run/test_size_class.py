@@ -10,7 +10,7 @@ import pytest
 
 import smolux as sx
 from shared import extinction
-from smolux.methods.size_class import SizeClass
+from smolux.methods.size_class.method import SizeClass
 
 #: one law for many kernels: far from low rank, a narrow ridge, with zeros, gelling
 LAW = "a*abs(i - j) + b*exp(-((i - j)/w)**2) + c*(i*j)**m"

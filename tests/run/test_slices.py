@@ -11,14 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 import runs
+from smolux.methods.acceptance_rejection.method.pieces import SLACK
+from smolux.methods.low_rank.method.store import POOL_NEEDED, TAIL
+from smolux.methods.size_class.method.state import CHUNK, FREE
 
 import smolux as sx
 from smolux import files, processes
 from smolux.core.state import GROW, STORED
-from smolux.methods import acceptance_rejection, base, inverse, low_rank, size_class
-from smolux.methods.acceptance_rejection_pieces import SLACK
-from smolux.methods.low_rank_store import POOL_NEEDED, TAIL
-from smolux.methods.size_class_state import CHUNK, FREE
+from smolux.methods import base
+from smolux.methods.acceptance_rejection.method import method as acceptance_rejection
+from smolux.methods.inverse.method import method as inverse
+from smolux.methods.low_rank.method import method as low_rank
+from smolux.methods.size_class.method import method as size_class
 from smolux.planning import make_plan
 from smolux.replicas import Group
 

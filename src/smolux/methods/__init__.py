@@ -1,10 +1,10 @@
 """Ways to draw the next event: one file per method."""
 
-from .acceptance_rejection import AcceptanceRejection
+from .acceptance_rejection.method import AcceptanceRejection
 from .base import Method
-from .inverse import Inverse
-from .low_rank import FictitiousJumps, LowRank
-from .size_class import SizeClass
+from .inverse.method import Inverse
+from .low_rank.method import FictitiousJumps, LowRank
+from .size_class.method import SizeClass
 
 #: every method
 METHODS: tuple[type[Method], ...] = (

@@ -8,9 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..core.levels import level_edges, level_of
-from ..core.loop import Pieces
-from ..core.state import (
+from ...core.loop import Pieces
+from ...core.state import (
     FLOOR,
     LARGEST,
     MAJORANT,
@@ -24,10 +23,11 @@ from ..core.state import (
     WORST_J,
     State,
 )
-from ..errors import InputError
-from .acceptance_rejection_pieces import AHEAD, bind
-from .acceptance_rejection_store import APART, HIGH, LOW, Work
-from .base import Float, Int, Method, Rates, enlarged, spread
+from ...errors import InputError
+from ..base import Float, Int, Method, Rates, enlarged, spread
+from .levels import level_edges, level_of
+from .pieces import AHEAD, bind
+from .store import APART, HIGH, LOW, Work
 
 #: rates of sizes up to this are tabulated when computing one costs more than reading it
 _TABLE = 192

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from ..model import Model
 from ..processes.base import PairProcess
-from .acceptance_rejection import AcceptanceRejection
+from .acceptance_rejection.method import AcceptanceRejection
 from .base import Method, Rates
-from .low_rank import LowRank
-from .size_class import SizeClass
+from .low_rank.method import LowRank
+from .size_class.method import SizeClass
 
 Float = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.compile import at, cold_piece, piece
-from ..core.prefetch import prefetch
-from .size_class_state import AHEAD, CHUNK, FREE, NEXT, SINGLE, SLOT, SLOT_BITS
+from ...core.compile import at, cold_piece, piece
+from ...core.prefetch import prefetch
+from .state import AHEAD, CHUNK, FREE, NEXT, SINGLE, SLOT, SLOT_BITS
 
 #: entries are asked for so far from the ends of lists, as these move
 _STRIDE = 32

@@ -7,20 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from ..core import alias, rng
-from ..core.bounds import ROUNDING, note_bad, repair
-from ..core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
-from ..core.compile import at, cold_piece, piece
-from ..core.loop import PATIENCE, Pieces
-from ..core.prefetch import prefetch
-from ..core.state import FIRST, MAJORANT, PARTICLES, SINCE, TRIALS, VOLUME
-from ..core.store import Store, pieces_of
-from ..core.together import largest_rate, slots_with, takes
-from ..core.wide import upper_half
-from .size_class_lists import place_in, place_of_particle, size_at, size_of_particle
-from .size_class_state import AHEAD, BITS, BLOCK, FREE, NEXT, PAIRS, SLOT, SLOT_BITS, STALE, view
-from .size_class_store import chunks_for, double, insert, listed, make_visit, remove
-from .size_class_table import prepare
+from ...core import rng
+from ...core.bounds import ROUNDING, note_bad, repair
+from ...core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
+from ...core.compile import at, cold_piece, piece
+from ...core.loop import PATIENCE, Pieces
+from ...core.prefetch import prefetch
+from ...core.state import FIRST, MAJORANT, PARTICLES, SINCE, TRIALS, VOLUME
+from ...core.store import Store, pieces_of
+from ...core.together import largest_rate, slots_with, takes
+from ...core.wide import upper_half
+from . import alias
+from .lists import place_in, place_of_particle, size_at, size_of_particle
+from .state import AHEAD, BITS, BLOCK, FREE, NEXT, PAIRS, SLOT, SLOT_BITS, STALE, view
+from .store import chunks_for, double, insert, listed, make_visit, remove
+from .table import prepare
 
 
 @piece

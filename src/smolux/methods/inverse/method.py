@@ -7,13 +7,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..core.loop import Pieces
-from ..core.state import LARGEST, PARTICLES, STORED, State
-from ..core.sums import BLOCK
-from ..errors import InputError
-from .base import Int, Method, Rates, enlarged, spread
-from .inverse_pieces import bind
-from .inverse_store import Work
+from ...core.loop import Pieces
+from ...core.state import LARGEST, PARTICLES, STORED, State
+from ...errors import InputError
+from ..base import Int, Method, Rates, enlarged, spread
+from .pieces import bind
+from .store import Work
+from .sums import BLOCK
 
 
 @dataclass(frozen=True)

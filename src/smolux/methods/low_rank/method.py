@@ -7,34 +7,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..core.loop import Pieces
-from ..core.segment_tree import FANOUT, levels_of
-from ..core.slots import slot_edges
-from ..core.state import (
-    LARGEST,
-    PARTICLES,
-    SMALLEST,
-    STORED,
-    TIME,
-    VALUE,
-    WORST_I,
-    WORST_J,
-    State,
-)
-from ..errors import InputError
-from .base import Int, Method, Rates, enlarged, spread
-from .low_rank_pieces import bind
-from .low_rank_store import (
-    METAS,
-    POOL_NEEDED,
-    SLOTS_NEEDED,
-    STAGE,
-    TAIL,
-    WANTED,
-    WIDEST,
-    Work,
-)
+from ...core.loop import Pieces
+from ...core.slots import slot_edges
+from ...core.state import LARGEST, PARTICLES, SMALLEST, STORED, TIME, VALUE, WORST_I, WORST_J, State
+from ...errors import InputError
+from ..base import Int, Method, Rates, enlarged, spread
 from .majorants import Tables, fill_bounds, fitted, from_powers, units_of
+from .pieces import bind
+from .segment_tree import FANOUT, levels_of
+from .store import METAS, POOL_NEEDED, SLOTS_NEEDED, STAGE, TAIL, WANTED, WIDEST, Work
 
 #: stages of a majorant that is found: one for each octave of the largest size
 _STAGES = 62

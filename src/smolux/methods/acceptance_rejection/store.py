@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.compile import at, cold_piece, piece
-from ..core.levels import level_of
-from ..core.state import (
+from ...core.compile import at, cold_piece, piece
+from ...core.state import (
     FIRST,
     LARGEST,
     LIMIT,
@@ -20,6 +19,7 @@ from ..core.state import (
     STORED,
     TRIALS,
 )
+from .levels import level_of
 
 # Entries of Work.apart.
 APART, VAIN, LOOKED, LOW, HIGH = range(5)

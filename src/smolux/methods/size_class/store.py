@@ -6,10 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..core.compile import at, cold_piece, piece
-from ..core.slots import slot_of
-from .size_class_lists import append, cut, duplicate, is_list, place_of, size_at
-from .size_class_state import AHEAD, BITS, CHUNK, FREE, NEXT, SHARE, SINGLE, STALE, WIDEST
+from ...core.compile import at, cold_piece, piece
+from ...core.slots import slot_of
+from .lists import append, cut, duplicate, is_list, place_of, size_at
+from .state import AHEAD, BITS, CHUNK, FREE, NEXT, SHARE, SINGLE, STALE, WIDEST
 
 
 @piece

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.compile import piece
+from ...core.compile import piece
 
 #: candidates drawn ahead, so that their memory is there when it is needed
 AHEAD = 32
@@ -54,7 +54,7 @@ class Work(NamedTuple):
     pool : int32 or int64 array of shape (R, entries)
         Sizes.
     table : uint64 array of shape (R, 3 P)
-        The alias table of pairs of classes, see `smolux.core.alias.pack`.
+        The alias table of pairs of classes, see `smolux.methods.size_class.alias.pack`.
     weight, share : float64 arrays of shape (R, P)
     classes : uint32 array of shape (R, P)
         The two classes of each pair in the table, 16 bits each.

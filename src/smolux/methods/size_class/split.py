@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compile import entry
-from ..core.rng import below
-from .size_class_lists import append, is_list, place_of, size_at
-from .size_class_state import BITS, SINGLE, WIDEST, view
+from ...core.compile import entry
+from ...core.rng import below
+from .lists import append, is_list, place_of, size_at
+from .state import BITS, SINGLE, WIDEST, view
 
 
 class Pile(NamedTuple):
@@ -24,7 +24,7 @@ class Pile(NamedTuple):
     sizes : int64 array
         Of the particles of all lists, class by class.
     bits, widest : int
-        Of the store, see `smolux.methods.size_class_state`.
+        Of the store, see `smolux.methods.size_class.method.state`.
     """
 
     number: NDArray[np.int64]

@@ -7,27 +7,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..core.bounds import ROUNDING
-from ..core.loop import Pieces
-from ..core.slots import slot_edges
-from ..core.state import MAJORANT, PARTICLES, SINCE, TIME, State
-from ..errors import InputError
-from . import size_class_pieces as pieces
-from .base import Int, Method, Rates, Words, enlarged, size_of, spread
-from .size_class_deal import Pile, collect, split
-from .size_class_state import (
-    AHEAD,
-    BITS,
-    CHUNK,
-    FREE,
-    META,
-    NEXT,
-    SINGLE,
-    SPAN,
-    STALE,
-    WIDEST,
-    Work,
-)
+from ...core.bounds import ROUNDING
+from ...core.loop import Pieces
+from ...core.slots import slot_edges
+from ...core.state import MAJORANT, PARTICLES, SINCE, TIME, State
+from ...errors import InputError
+from ..base import Int, Method, Rates, Words, enlarged, size_of, spread
+from . import pieces
+from .split import Pile, collect, split
+from .state import AHEAD, BITS, CHUNK, FREE, META, NEXT, SINGLE, SPAN, STALE, WIDEST, Work
 
 #: octaves of sizes by which arrays and bounds are extended
 _OCTAVES = 4

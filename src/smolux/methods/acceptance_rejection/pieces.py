@@ -8,15 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core import rng
-from ..core.bounds import ROUNDING, note_bad, note_largest, repair
-from ..core.burst import NOT_PLAIN, PLAIN, Burst, make_draw_one
-from ..core.compile import at, cold_piece, piece
-from ..core.levels import renew_majorant
-from ..core.loop import PATIENCE, Pieces
-from ..core.prefetch import prefetch
-from ..core.slots import slot_of
-from ..core.state import (
+from ...core import rng
+from ...core.bounds import ROUNDING, note_bad, note_largest, repair
+from ...core.burst import NOT_PLAIN, PLAIN, Burst, make_draw_one
+from ...core.compile import at, cold_piece, piece
+from ...core.loop import PATIENCE, Pieces
+from ...core.prefetch import prefetch
+from ...core.slots import slot_of
+from ...core.state import (
     FIRST,
     FLOOR,
     LARGEST,
@@ -32,19 +31,10 @@ from ..core.state import (
     VALUE,
     VOLUME,
 )
-from ..core.store import Store, pieces_of
-from ..core.together import largest_rate, takes
-from .acceptance_rejection_store import (
-    APART,
-    SLACK,
-    VAIN,
-    renew_all,
-    rescan,
-    seek_apart,
-    size_of,
-    view,
-    watch,
-)
+from ...core.store import Store, pieces_of
+from ...core.together import largest_rate, takes
+from .levels import renew_majorant
+from .store import APART, SLACK, VAIN, renew_all, rescan, seek_apart, size_of, view, watch
 
 #: candidates whose pairs are drawn ahead, so that their memory is there when it is needed
 AHEAD = 8

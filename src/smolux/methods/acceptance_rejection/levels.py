@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from .compile import cold_piece, piece
-from .state import BOUND, FLOOR, LARGEST, MAJORANT, SMALLEST
+from ...core.compile import cold_piece, piece
+from ...core.state import BOUND, FLOOR, LARGEST, MAJORANT, SMALLEST
 
 
 def level_edges() -> np.ndarray:

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from ..core import alias
-from ..core.compile import cold_piece, piece
-from ..core.slots import slot_top
-from ..core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
-from .size_class_state import AHEAD, BITS, BLOCK, NEXT, PAIRS, SHARE, SPAN, STALE
+from ...core.compile import cold_piece, piece
+from ...core.slots import slot_top
+from ...core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
+from . import alias
+from .state import AHEAD, BITS, BLOCK, NEXT, PAIRS, SHARE, SPAN, STALE
 
 #: standard deviations of what comes in for which there is room at most
 _WIDEST = 8.0

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from ..core.compile import cold_piece, piece
-from ..core.segment_tree import build
-from ..core.slots import octave
-from ..core.state import BOUND, LARGEST, PARTICLES, SINCE
-from .low_rank_store import APART, SEEK, STAGE, WANTED, rescan
+from ...core.compile import cold_piece, piece
+from ...core.slots import octave
+from ...core.state import BOUND, LARGEST, PARTICLES, SINCE
+from .segment_tree import build
+from .store import APART, SEEK, STAGE, WANTED, rescan
 
 #: sums are kept below this number of quanta, so that a uniform number can tell them all apart
 MOST = 1 << 52

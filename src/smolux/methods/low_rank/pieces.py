@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ..core import rng
-from ..core.bounds import ROUNDING, note_bad, repair
-from ..core.compile import cold_piece, piece
-from ..core.loop import PATIENCE, Pieces
-from ..core.prefetch import prefetch
-from ..core.segment_tree import add, find, find_mixed
-from ..core.state import FIRST, FLOOR, PARTICLES, SECOND, TRIALS, VALUE, VOLUME
-from ..core.store import Store, pieces_of
-from ..core.together import largest_rate, slots_with, takes
-from .low_rank_store import (
+from ...core import rng
+from ...core.bounds import ROUNDING, note_bad, repair
+from ...core.compile import cold_piece, piece
+from ...core.loop import PATIENCE, Pieces
+from ...core.prefetch import prefetch
+from ...core.state import FIRST, FLOOR, PARTICLES, SECOND, TRIALS, VALUE, VOLUME
+from ...core.store import Store, pieces_of
+from ...core.together import largest_rate, slots_with, takes
+from .segment_tree import add, find, find_mixed
+from .store import (
     APART,
     POOL_NEEDED,
     SEEK,
@@ -36,7 +36,7 @@ from .low_rank_store import (
     take,
     view,
 )
-from .low_rank_trees import MOST, prepare, root_of
+from .trees import MOST, prepare, root_of
 
 
 @piece
