@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from smolux.callables import Function
-from smolux.formula import Formula
+from smolux.functions.formula import Formula
+from smolux.functions.user_function import Function
 from smolux.kernels import Kernel
 from smolux.weighting.base import Weighting
 

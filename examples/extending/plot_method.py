@@ -17,7 +17,6 @@ import numpy as np
 import smolux as sx
 from smolux.core import rng
 from smolux.core.bounds import note_bad, note_largest
-from smolux.core.compile import piece
 from smolux.core.slots import slot_of
 from smolux.core.state import (
     FIRST,
@@ -30,6 +29,7 @@ from smolux.core.state import (
     VOLUME,
 )
 from smolux.core.store import Store, pieces_of
+from smolux.jit.compile import piece
 from smolux.methods.base import Method, enlarged
 
 

@@ -14,19 +14,19 @@ __version__ = "0.1.0"
 #: public name -> module that defines it; a module stands for itself
 _LAZY = {
     "Model": "smolux.model",
-    "simulate": "smolux.stochastic",
-    "resume": "smolux.stochastic",
+    "simulate": "smolux.stochastic.simulation",
+    "resume": "smolux.stochastic.simulation",
     "solve": "smolux.deterministic",
     "sweep": "smolux.sweeps",
     "ensemble": "smolux.ensembles",
     "efficiency": "smolux.ensembles",
     "summary": "smolux.analysis",
-    "law": "smolux.stated",
+    "law": "smolux.functions.stated",
     "InputError": "smolux.errors",
     "WorkerError": "smolux.errors",
     "Interrupted": "smolux.errors",
     "SmoluxWarning": "smolux.errors",
-    "Progress": "smolux.progress",
+    "Progress": "smolux.runtime.progress",
     **dict.fromkeys(
         (
             "analysis",
@@ -105,10 +105,10 @@ if TYPE_CHECKING:
     from .ensembles.efficiency import efficiency
     from .ensembles.ensemble import ensemble
     from .errors import InputError, Interrupted, SmoluxWarning, WorkerError
+    from .functions.stated import law
     from .model import Model
-    from .progress import Progress
-    from .stated import law
-    from .stochastic import resume, simulate
+    from .runtime.progress import Progress
+    from .stochastic.simulation import resume, simulate
     from .sweeps import sweep
 
 

@@ -9,15 +9,15 @@ from typing import Any, TypeVar
 import numpy as np
 
 from . import kernels
-from .callables import Function
 from .errors import InputError, Problem, about, did_you_mean
+from .functions.law import Law
+from .functions.stated import Stated
+from .functions.user_function import Function
 from .initial import INITIALS, Initial, Sizes, from_sizes, monodisperse
 from .kernels.base import Kernel
-from .laws import Law
 from .model import Model
 from .processes import PROCESSES
 from .processes.base import Process
-from .stated import Stated
 
 T = TypeVar("T")
 #: the keys that lead to a part of a model

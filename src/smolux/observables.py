@@ -2,7 +2,7 @@
 
 The tally of a run, how sub-volumes make it up, the Dataset with its units and its page in the
 reference follow. A variable that is a column of the state is a row here and nothing else; one that
-is computed has a function beside it, by its name, in `smolux.observe`.
+is computed has a function beside it, by its name, in `smolux.stochastic.observe`.
 """
 
 from __future__ import annotations

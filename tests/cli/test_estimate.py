@@ -7,10 +7,11 @@ import pytest
 
 import smolux
 from shared import KERNEL
-from smolux import executors, plan
 from smolux.case import parse
 from smolux.cli import checking, estimate
 from smolux.errors import InputError
+from smolux.runtime import executors
+from smolux.stochastic.simulation import plan
 
 
 def case(kernel: str, run: str = "times = [2]", rest: str = ""):

@@ -10,8 +10,8 @@ import smolux as sx
 from shared import FORMULA
 from smolux.cli import console
 from smolux.cli.progress import Display, line
-from smolux.progress import Progress
-from smolux.stopping import ALL, AtOnce, Stopper
+from smolux.runtime.progress import Progress
+from smolux.runtime.stopping import ALL, AtOnce, Stopper
 
 
 def at(fraction: float, events: int = 1_234_567, speed: float = 2.5e6, **known: Any) -> Progress:

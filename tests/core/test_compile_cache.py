@@ -15,14 +15,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from smolux.stochastic.simulation.assembly import _key, loop_for
 
 import smolux as sx
-from smolux import files
-from smolux.assembly import _key, loop_for
-from smolux.content import digest
-from smolux.core import compile as compiling
-from smolux.core.compile import cache_directory, statistics
-from smolux.files import kept
+from smolux.functions.content import digest
+from smolux.jit import compile as compiling
+from smolux.jit.compile import cache_directory, statistics
+from smolux.runtime import files
+from smolux.runtime.files import kept
 from smolux.weighting import WEIGHTINGS, Number
 
 #: a function with everything that an edit may touch
@@ -33,7 +33,7 @@ from math import sqrt
 import numba
 import numpy as np
 
-from smolux.core.compile import cold_piece, entry
+from smolux.jit.compile import cold_piece, entry
 
 SCALE = 2.0
 TABLE = np.array([1.0, 3.0])
@@ -394,7 +394,7 @@ def test_an_edited_global_makes_another_loop() -> None:
 LONG = "".join(f"        x += math.sin(factor * x + {k})\n" for k in range(40))
 SMALL = f"""
 import json, math, os, sys
-from smolux.core.compile import cold_piece, entry, statistics
+from smolux.jit.compile import cold_piece, entry, statistics
 
 def make(factor):
     @cold_piece
@@ -458,7 +458,7 @@ def test_a_function_that_calls_itself(tmp_path: Path) -> None:
     # Numba's own cache ends the process here
     script = (
         "import json\n"
-        "from smolux.core.compile import entry, user_piece\n"
+        "from smolux.jit.compile import entry, user_piece\n"
         "@user_piece\n"
         "def inner(x, n):\n"
         "    if n <= 1:\n"
@@ -474,8 +474,8 @@ def test_a_function_that_calls_itself(tmp_path: Path) -> None:
 def test_the_digest_is_that_of_every_process(tmp_path: Path) -> None:
     script = (
         "import json, smolux as sx\n"
-        "from smolux.assembly import loop_for\n"
-        "from smolux.content import digest\n"
+        "from smolux.stochastic.assembly import loop_for\n"
+        "from smolux.functions.content import digest\n"
         "from smolux.weighting import Number\n"
         "def K(i, j):\n"
         "    return 1.0 if i + j in {2.0, 3.0, 5.0} else i + j\n"
@@ -489,7 +489,7 @@ def test_the_digest_is_that_of_every_process(tmp_path: Path) -> None:
 SIMULATION = """
 import json, sys
 import smolux as sx
-from smolux.core.compile import statistics
+from smolux.jit.compile import statistics
 
 SCALE = 3.0
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from smolux.methods.acceptance_rejection.method.levels import level_edges, level_of
 from smolux.methods.inverse.method.sums import BLOCK, find, find_large, shift, weigh
 
-from smolux.core.compile import entry
 from smolux.core.state import LIMIT
+from smolux.jit.compile import entry
 
 EDGES = level_edges()
 

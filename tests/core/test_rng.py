@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from smolux.core import rng
-from smolux.core.compile import entry
+from smolux.jit.compile import entry
 
 MASK = (1 << 64) - 1
 #: first outputs of xoshiro256++ from the state 1, 2, 3, 4, as published with other implementations

@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from smolux.core.wide import upper_half
+from smolux.jit.wide import upper_half
 
 words = st.integers(0, (1 << 64) - 1)
 

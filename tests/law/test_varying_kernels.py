@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from smolux.stochastic.simulation.planning import make_plan
+from smolux.stochastic.simulation.replicas import Group
+from smolux.stochastic.simulation.windows import windows_for
 from tests.shared import FORMULA, QUICK, extinction
 
 import smolux as sx
 from smolux import case as cases
-from smolux import checkpoint as checkpoints
 from smolux.analysis.reference import model_of
 from smolux.cli.estimate import negative_rates
 from smolux.deterministic.steady import steady_state
@@ -18,9 +20,7 @@ from smolux.exact import finite
 from smolux.exact.find import solution
 from smolux.kernels import Sum, from_dict
 from smolux.methods.choose import unforeseen
-from smolux.planning import make_plan
-from smolux.replicas import Group
-from smolux.windows import windows_for
+from smolux.stochastic.simulation import checkpoint as checkpoints
 
 P = sx.processes
 #: the choice by the sum is the loop's and not the method's: one method is quick to compile

@@ -12,10 +12,10 @@ import chains
 import laws
 import numpy as np
 import pytest
+from smolux.stochastic.simulation.assembly import rates_for
 
 import smolux as sx
 from shared import QUICK, extinction
-from smolux.assembly import rates_for
 from smolux.errors import InputError
 
 METHODS = [method.name for method in sx.methods.METHODS]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import smolux as sx
-from smolux import plan, planning
 from smolux.errors import InputError
+from smolux.stochastic.simulation import plan, planning
 
 MODEL = sx.Model(sx.kernels.Constant())
 

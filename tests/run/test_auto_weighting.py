@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from smolux.stochastic.simulation.choose_method import event_cost
+from smolux.stochastic.simulation.plan import Plan
+from smolux.stochastic.simulation.planning import make_plan
 
 import smolux as sx
 from shared import FORMULA
 from smolux import case as cases
-from smolux import checkpoint, pilot, planning
 from smolux.cli import running
-from smolux.costing import event_cost
 from smolux.errors import InputError
-from smolux.goal import Goal
-from smolux.plan import Plan
-from smolux.planning import make_plan
+from smolux.settings.target_error import Goal
+from smolux.stochastic.simulation import checkpoint, planning
+from smolux.stochastic.simulation import choose_weighting as pilot
 
 METHOD = "acceptance-rejection"
 KERNEL = sx.kernels.formula(FORMULA, c0=1.0, c1=0.0, c2=0.0, c3=0.0)

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 import runs
+from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
 from shared import EVERY, QUICK, VARYING
-from smolux import replicas, stochastic
-from smolux.replicas import Group
+from smolux.stochastic.simulation import replicas
+from smolux.stochastic.simulation import simulation as stochastic
 
 every_method = pytest.mark.parametrize("method", EVERY)
 TIMES = [0.5, 3.0]

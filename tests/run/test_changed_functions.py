@@ -11,14 +11,14 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from smolux.stochastic.simulation.planning import make_plan
+from smolux.stochastic.simulation.windows import windows_for
 
 import smolux as sx
 from smolux import processes
-from smolux.content import digest, frozen, is_frozen
-from smolux.core.compile import user_piece
 from smolux.deterministic.splitting import Splits
-from smolux.planning import make_plan
-from smolux.windows import windows_for
+from smolux.functions.content import digest, frozen, is_frozen
+from smolux.jit.compile import user_piece
 
 slow = pytest.mark.slow
 METHODS = [
@@ -82,7 +82,7 @@ def test_a_cell_that_is_run_again_is_what_runs(method: str) -> None:
 NEW_PROCESS = """
 import json, sys
 import smolux as sx
-from smolux.core.compile import statistics
+from smolux.jit.compile import statistics
 space = {"a": 2.0, "__name__": "notebook"}
 exec(sys.argv[1], space)
 model = sx.Model(sx.kernels.from_function(space["K"]), initial=sx.initial.monodisperse(size=1000))

@@ -16,10 +16,11 @@ import runs
 import shared
 import smolux as sx
 from shared import EVERY, QUICK, VARYING
-from smolux import checkpoint as checkpoints
-from smolux import replicas, resources, room
 from smolux.core.state import BUDGET, GROW
 from smolux.errors import InputError, Interrupted
+from smolux.runtime import resources, room
+from smolux.stochastic.simulation import checkpoint as checkpoints
+from smolux.stochastic.simulation import replicas
 
 pytestmark = shared.stopped
 slow = pytest.mark.slow

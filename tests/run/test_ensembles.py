@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import stats
+from smolux.stochastic.simulation.planning import make_plan
 
 import smolux as sx
 from shared import FORMULA, extinction
@@ -22,8 +23,7 @@ from smolux.ensembles.efficiency import _compared, _reference
 from smolux.ensembles.ensemble import Collected
 from smolux.errors import InputError
 from smolux.exact import finite
-from smolux.goal import Goal
-from smolux.planning import make_plan
+from smolux.settings.target_error import Goal
 
 METHOD = "acceptance-rejection"
 MODEL = sx.Model(kernel=sx.kernels.Constant())

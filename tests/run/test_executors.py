@@ -22,9 +22,11 @@ import pytest
 import runs
 
 import smolux as sx
-from smolux import driving, executors, replicas, stochastic
 from smolux.errors import InputError, Interrupted, WorkerError
-from smolux.executors import RETRIES, _renewed, completed, opened
+from smolux.runtime import executors
+from smolux.runtime.executors import RETRIES, _renewed, completed, opened
+from smolux.stochastic.simulation import driving, replicas
+from smolux.stochastic.simulation import simulation as stochastic
 
 
 class InThisProcess(Executor):
@@ -364,7 +366,7 @@ def test_mpi(tmp_path: Path, expected: Any) -> None:
     script.write_text(
         "import sys\n"
         f"sys.path += {FOLDERS!r}\n"
-        "import runs\nimport smolux as sx\nfrom smolux.executors import opened\n"
+        "import runs\nimport smolux as sx\nfrom smolux.runtime.executors import opened\n"
         "if __name__ == '__main__':\n"
         "    with opened('mpi') as pool:\n"
         f"        ds = sx.simulate(runs.model(0.1), [0.5, 3.0], executor=pool, **{SETTINGS!r})\n"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import smolux as sx
-from smolux.timefunction import TimeFunction
+from smolux.functions.time import TimeFunction
 
 HOURS = np.array([0.0, 7.0, 7.01, 7.02, 100.0])
 FLOW = np.array([0.0, 0.0, 50.0, 0.0, 0.0])

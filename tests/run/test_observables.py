@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 import runs
+from smolux.stochastic.simulation.replicas import empty_state
 
 import shared
 import smolux as sx
 from shared import VARYING
-from smolux import checkpoint as checkpoints
 from smolux import observables
 from smolux.core import state as states
 from smolux.core.columns import Columns, Rule
 from smolux.core.state import AT, EVENTS, HIGHEST, MASS_OUT, TRIALS
 from smolux.observables import OBSERVABLES, Observable
-from smolux.replicas import empty_state
 from smolux.results.dataset import VARIABLES
+from smolux.stochastic.simulation import checkpoint as checkpoints
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -14,17 +14,18 @@ import runs
 from smolux.methods.acceptance_rejection.method.pieces import SLACK
 from smolux.methods.low_rank.method.store import POOL_NEEDED, TAIL
 from smolux.methods.size_class.method.state import CHUNK, FREE
+from smolux.stochastic.simulation.planning import make_plan
+from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
-from smolux import files, processes
+from smolux import processes
 from smolux.core.state import GROW, STORED
 from smolux.methods import base
 from smolux.methods.acceptance_rejection.method import method as acceptance_rejection
 from smolux.methods.inverse.method import method as inverse
 from smolux.methods.low_rank.method import method as low_rank
 from smolux.methods.size_class.method import method as size_class
-from smolux.planning import make_plan
-from smolux.replicas import Group
+from smolux.runtime import files
 
 slow = pytest.mark.slow
 METHODS = [

@@ -9,17 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 import runs
+from smolux.stochastic.simulation.replicas import Group
+from smolux.stochastic.simulation.subvolumes import Divided
 
 import shared
 import smolux as sx
 from shared import VARYING
-from smolux import resources, room, subvolumes
 from smolux.core.state import TIME
 from smolux.errors import InputError, SmoluxWarning
 from smolux.exact import finite
-from smolux.replicas import Group
+from smolux.runtime import resources, room
 from smolux.settings import simulation
-from smolux.subvolumes import Divided
+from smolux.stochastic.simulation import subvolumes
 
 pytestmark = shared.stopped
 

@@ -11,18 +11,19 @@ import numpy as np
 import pytest
 import runs
 from scipy import stats
+from smolux.stochastic.simulation.observe import observable
+from smolux.stochastic.simulation.plan import PILOT
+from smolux.stochastic.simulation.planning import make_plan
 
 import shared
 import smolux as sx
-from smolux import driving, replicas, stochastic
 from smolux.confidence import Sample, mean_interval
 from smolux.core.state import new_tally
 from smolux.errors import InputError, SmoluxWarning
-from smolux.goal import Goal, Trial, judge, plan_replicas
 from smolux.observables import recorded
-from smolux.observe import observable
-from smolux.plan import PILOT
-from smolux.planning import make_plan
+from smolux.settings.target_error import Goal, Trial, judge, plan_replicas
+from smolux.stochastic.simulation import driving, replicas
+from smolux.stochastic.simulation import simulation as stochastic
 
 pytestmark = shared.stopped
 
@@ -184,7 +185,7 @@ def test_replicas_that_no_longer_fit_end_it(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def until(goal: Goal, draw: Any) -> Any:
-    """Pilots, then the replicas of the result, as `smolux.driving.Run.more` does it."""
+    """Pilots, then the replicas of the result, as `smolux.stochastic.driving.Run.more` does it."""
     pilots = draw(goal.first)
     moved = np.array([True] * pilots.shape[1])
     while (trial := plan_replicas(goal, pilots, moved)).pilots > len(pilots):

@@ -12,15 +12,16 @@ import numpy as np
 import pytest
 import runs
 from scipy import stats
+from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
 from shared import QUICK, extinction
-from smolux import assembly, files
 from smolux.core.state import BY_FACTOR, BY_KERNEL, DONE, EVENTS, EXTINCT, REPAIRS, TIME
 from smolux.errors import InputError, SmoluxWarning
+from smolux.functions.time import TimeFunction
 from smolux.kernels.formula_kernel import FormulaKernel
-from smolux.replicas import Group
-from smolux.timefunction import TimeFunction
+from smolux.runtime import files
+from smolux.stochastic.simulation import assembly
 
 every_method = pytest.mark.parametrize(
     "method",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import smolux as sx
-from smolux.records import Records
 from smolux.results import to_dataset
+from smolux.results.records import Records
 
 SIZES = 64
 

@@ -10,8 +10,8 @@ from scipy import stats
 import smolux as sx
 from smolux import analysis
 from smolux.analysis.rare import Rare
-from smolux.records import Records
 from smolux.results import to_dataset
+from smolux.results.records import Records
 
 
 def repeated(replicas, columns=2000, seed=5):

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smolux.errors import InputError
-from smolux.formula import FUNCTIONS, Formula, parse
-from smolux.intervals import Interval
+from smolux.functions.formula import FUNCTIONS, Formula, parse
+from smolux.functions.intervals import Interval
 
 NAMES = ("i", "j", "a")
 quick = settings(max_examples=80, deadline=None, derandomize=True)

@@ -10,12 +10,12 @@ import pytest
 from scipy import stats
 
 import smolux as sx
-from smolux import assembly
-from smolux.callables import Function
 from smolux.core import rng, splits
 from smolux.core.slots import slot_edges
 from smolux.core.state import LONE_BITS, State, new_state
+from smolux.functions.user_function import Function
 from smolux.processes import Fragmentation
+from smolux.stochastic.simulation import assembly
 
 #: any power of the product, in one compiled function
 LAW = "(i*j)**p"

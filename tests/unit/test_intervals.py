@@ -12,8 +12,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from smolux.boxes import subdivided
-from smolux.intervals import UFUNCS, Interval, UndecidedError
+from smolux.functions.bounds import subdivided
+from smolux.functions.intervals import UFUNCS, Interval, UndecidedError
 
 quick = settings(max_examples=60, deadline=None, derandomize=True)
 

@@ -10,7 +10,7 @@ from shared import extinction
 from smolux import exact, kernels
 from smolux.case import parse
 from smolux.errors import InputError
-from smolux.intervals import Interval
+from smolux.functions.intervals import Interval
 from smolux.kernels import Sum, formula, from_dict, from_function
 from smolux.model_dict import model_from_dict, model_to_dict
 

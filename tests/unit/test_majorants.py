@@ -7,9 +7,9 @@ from itertools import product
 import numpy as np
 import pytest
 from smolux.methods.low_rank.method.majorants import fill_bounds, fitted, from_powers
+from smolux.stochastic.simulation.assembly import rates_for
 
 import smolux as sx
-from smolux.assembly import rates_for
 from smolux.core.slots import slot_edges
 from smolux.kernels import KERNELS, Kernel, Majorant
 from smolux.weighting import Number

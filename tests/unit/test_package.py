@@ -45,7 +45,7 @@ def test_physics_is_described_without_numba():
 def test_loops_load_no_linear_algebra_but_have_it_when_asked():
     code = (
         "import sys, numpy as np\n"
-        "from smolux.core.compile import user_piece\n"
+        "from smolux.jit.compile import user_piece\n"
         "import numba.np.arraymath\n"
         "assert 'scipy.linalg' not in sys.modules\n"
         "product = user_piece(lambda a: np.dot(a, a))\n"
@@ -64,7 +64,7 @@ def test_every_public_name_is_there(name):
 
 def test_names_are_the_objects_they_stand_for():
     assert smolux.plot is smolux.plotting
-    assert smolux.simulate.__module__ == "smolux.stochastic"
+    assert smolux.simulate.__module__ == "smolux.stochastic.simulation"
     assert smolux.solve.__module__ == "smolux.deterministic.solver"
     assert callable(smolux.summary)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from smolux import resources
+from smolux.runtime import resources
 
 MANY = 1 << 62
 

@@ -15,7 +15,8 @@ import synthetic
 import xarray as xr
 
 import smolux as sx
-from smolux import files, results
+from smolux import results
+from smolux.runtime import files
 
 
 @pytest.fixture

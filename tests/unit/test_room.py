@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from smolux import resources, room
 from smolux.errors import InputError, OutOfMemoryError
+from smolux.runtime import resources, room
 
 GB = 10**9
 

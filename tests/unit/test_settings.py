@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from smolux.stochastic.simulation.planning import make_plan
 
 import smolux as sx
 from smolux import case as cases
 from smolux.case import spatial as in_space
 from smolux.errors import InputError, Problem, about
 from smolux.kernels import KERNELS
-from smolux.planning import make_plan
 from smolux.settings import (
     Control,
     Settings,

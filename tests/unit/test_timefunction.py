@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from smolux.errors import InputError
-from smolux.timefunction import TimeFunction
+from smolux.functions.time import TimeFunction
 
 of = TimeFunction.of
 

@@ -10,8 +10,8 @@ import pytest
 
 from smolux.deterministic.timemesh import TimeMesh, within
 from smolux.errors import InputError
-from smolux.stated import law
-from smolux.timefunction import TimeFunction
+from smolux.functions.stated import law
+from smolux.functions.time import TimeFunction
 
 
 def mesh(given, end, tolerance=1e-8):

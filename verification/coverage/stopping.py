@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from smolux.confidence import Sample, mean_interval
-from smolux.goal import Goal, judge, plan_replicas
+from smolux.settings.target_error import Goal, judge, plan_replicas
 
 from ..outcome import Check, Item, Outcome, Table
 from .common import REPLICAS, sampled

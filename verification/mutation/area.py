@@ -15,7 +15,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
-from smolux.resources import cores
+from smolux.runtime.resources import cores
 
 from ..outcome import Check, Item, Outcome, Table
 from ..suite import ROOT

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from smolux.files import replacing
+from smolux.runtime.files import replacing
 
 
 class Records:

@@ -27,7 +27,14 @@ PATIENCE = 300
 WAITING = 2400
 #: files by which compiled code and bounds are kept: a mistake in them would spoil it for others
 _KEEPERS = frozenset(
-    ("content.py", "files.py", "remembered.py", "tables.py", "core/compile.py", "core/pipeline.py")
+    (
+        "functions/content.py",
+        "runtime/files.py",
+        "stochastic/remembered.py",
+        "stochastic/tables.py",
+        "jit/compile.py",
+        "jit/pipeline.py",
+    )
 )
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 

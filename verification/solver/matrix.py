@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from smolux.plotting.style import PALETTE, new_figure, styled, use_log
-from smolux.resources import cores
+from smolux.runtime.resources import cores
 
 from ..outcome import Check, Item, Outcome, Table, at_most
 from . import reference

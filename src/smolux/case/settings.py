@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import units
 from ..errors import InputError, did_you_mean
-from ..executors import KINDS
+from ..runtime.executors import KINDS
 from ..settings import Control, Settings, SolverSettings
 from ..settings.kinds import Kind, Seconds, Times, declared
 from ..settings.solution import OBSERVED
@@ -41,7 +41,7 @@ class Run(Settings):
 
 @dataclass(frozen=True)
 class Parallel:
-    """Where a case is computed; the arguments of `smolux.executors.opened`."""
+    """Where a case is computed; the arguments of `smolux.runtime.executors.opened`."""
 
     executor: str = "threads"
     workers: int | None = None

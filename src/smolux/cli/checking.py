@@ -11,10 +11,10 @@ from ..case.physics import model_tables
 from ..case.settings import as_table
 from ..case.write import value
 from ..errors import InputError
-from ..executors import check_installed
-from ..planning import make_plan
-from ..resources import cores
+from ..runtime.executors import check_installed
+from ..runtime.resources import cores
 from ..settings import SolverSettings
+from ..stochastic.planning import make_plan
 from .console import amount, duration
 from .estimate import estimate, negative_rates, physics_warnings
 

@@ -9,9 +9,9 @@ from .. import analysis
 from ..analysis.table import aligned
 from ..case import Case, Output, Run
 from ..errors import InputError
-from ..files import replacing
 from ..kernels import Constant
 from ..model import Model
+from ..runtime.files import replacing
 from . import rundir, running
 from .console import say
 

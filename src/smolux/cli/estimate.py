@@ -13,18 +13,18 @@ import smolux
 
 from ..case import Case
 from ..case.settings import Run
-from ..content import frozen
 from ..errors import Interrupted, quiet
+from ..functions.content import frozen
 from ..initial import Sizes
 from ..methods import METHODS, SizeClass
 from ..methods.base import Method
-from ..pilot import chosen_weighting
-from ..population import doubles_at
 from ..processes import Aggregation, Removal, Source
-from ..resources import available_memory, cores
-from ..room import amount
+from ..runtime.resources import available_memory, cores
+from ..runtime.room import amount
 from ..settings import Settings
-from ..windows import factors_of
+from ..settings.population import doubles_at
+from ..stochastic.choose_weighting import chosen_weighting
+from ..stochastic.windows import factors_of
 
 Float = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
-from ..progress import Progress
+from ..runtime.progress import Progress
 from .console import amount, duration, say
 
 

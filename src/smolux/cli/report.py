@@ -13,8 +13,8 @@ import smolux
 
 from .. import analysis
 from ..case import Case
-from ..files import replacing
 from ..results import warnings
+from ..runtime.files import replacing
 from . import showing
 from .console import amount, duration
 

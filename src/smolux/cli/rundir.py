@@ -8,7 +8,7 @@ from pathlib import Path
 from ..case import Case, load
 from ..case.spatial import SpatialCase
 from ..errors import InputError
-from ..files import replacing
+from ..runtime.files import replacing
 
 
 @dataclass(frozen=True)

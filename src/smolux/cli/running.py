@@ -15,17 +15,17 @@ from typing import Any
 
 import smolux
 
-from .. import checkpoint as checkpoints
 from .. import results
 from ..case import Case, parse
 from ..deterministic import SolverError
 from ..deterministic.solver import solve
 from ..errors import InputError, Interrupted, OutOfMemoryError, WorkerError, quiet
-from ..executors import opened
 from ..model_dict import model_to_dict
 from ..observables import units
+from ..runtime.executors import opened
+from ..runtime.stopping import ALL, Stopper
 from ..settings import Settings
-from ..stopping import ALL, Stopper
+from ..stochastic import checkpoint as checkpoints
 from . import figures, report
 from .console import duration, say
 from .progress import Display

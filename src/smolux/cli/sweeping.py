@@ -9,7 +9,7 @@ from typing import Any
 import smolux
 
 from ..errors import InputError, Interrupted, quiet
-from ..stopping import ALL, Stopper
+from ..runtime.stopping import ALL, Stopper
 from ..sweeps import go_on
 from ..sweeps.grid import failures
 from . import showing

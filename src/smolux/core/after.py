@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from .compile import piece
+from ..jit.compile import piece
 from .state import COUNTED, DOUBLE_AT, DOUBLINGS, EXTENSIVE, EXTINCT, GROW, PARTICLES, TIME
 
 

@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 
+from ..jit.compile import cold_piece, piece
 from . import rng
 from .bounds import thinned
-from .compile import cold_piece, piece
 from .fire import Books, Kinds
 from .loop import schedule
 from .state import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .compile import cold_piece, piece
+from ..jit.compile import cold_piece, piece
 from .state import (
     BAD_FACTOR,
     CULPRIT,

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+from ..jit.compile import piece
 from . import rng
-from .compile import piece
 from .state import (
     BAD_RATE,
     BOTH,

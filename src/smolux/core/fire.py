@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..jit.compile import piece
 from . import rng
 from .bounds import ROUNDING, note_bad, thinned
-from .compile import piece
 from .state import (
     BAD_SHARE,
     BY_KERNEL,

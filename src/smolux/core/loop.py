@@ -18,9 +18,9 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from ..jit.compile import cold_piece, entry, piece
 from .after import make_after_event
 from .burst import Burst
-from .compile import cold_piece, entry, piece
 from .record import make_record
 from .state import (
     BAD_RATE,

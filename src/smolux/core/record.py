@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from .compile import cold_piece, piece
+from ..jit.compile import cold_piece, piece
 from .slots import octave
 from .state import AT, HIGHEST, PER_PROCESS, SCALARS
 

@@ -13,7 +13,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from .compile import piece
+from ..jit.compile import piece
 
 
 @intrinsic

@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..jit.compile import cold_piece, piece, user_piece
 from . import rng
 from .bounds import ROUNDING, note_bad
-from .compile import cold_piece, piece, user_piece
 from .slots import octave, slot_of, slot_top
 from .state import COUNTED, LONE_BITS, LONE_SLOTS, RAISED, SPLIT_IN_DOUBT, TRIALS
 

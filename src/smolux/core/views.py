@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .compile import piece
+from ..jit.compile import piece
 from .state import State, Tally
 
 

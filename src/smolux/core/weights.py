@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from ..jit.compile import cold_piece, piece, user_piece
 from . import rng
-from .compile import cold_piece, piece, user_piece
 from .record import find_bin, power
 
 #: sums closer to a whole number than this are that number

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..functions.time import TimeFunction
 from ..kernels.base import Kernel
 from ..kernels.shared import Shared
 from ..model import Model
 from ..processes.base import PairProcess
 from ..processes.daughters import Merged
-from ..timefunction import TimeFunction
 from .lattice import on_multiples
 from .meeting import Meeting
 from .operator import Direct, Operator, OperatorFactory

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..processes.base import PairProcess, Process
-from ..records import Records
+from ..results.records import Records
 from .terms import Totals
 
 Float = NDArray[np.float64]

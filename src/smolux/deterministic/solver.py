@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..content import frozen
 from ..errors import InputError, Interrupted
+from ..functions.content import frozen
 from ..model import Model
 from ..processes import Source
-from ..progress import Progress
 from ..results import to_dataset, told
+from ..runtime.progress import Progress
 from ..settings import SolverSettings
 from .arguments import renamed
 from .encounters import Encounters
@@ -30,7 +30,7 @@ from .window import Window, usual_limit
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..records import Records
+    from ..results.records import Records
 
 Float = NDArray[np.float64]
 

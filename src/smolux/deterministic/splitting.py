@@ -7,9 +7,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..callables import golden
-from ..content import frozen
 from ..errors import InputError
+from ..functions.content import frozen
+from ..functions.user_function import golden
 from ..kernels import Constant
 from ..kernels.base import Kernel
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import linalg as krylov
 
-from ..content import frozen
 from ..errors import InputError
+from ..functions.content import frozen
 from ..model import Model
-from ..progress import Progress
+from ..runtime.progress import Progress
 from .arguments import renamed
 from .encounters import Encounters
 from .equations import Equations

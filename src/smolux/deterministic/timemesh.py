@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..callables import spread
 from ..errors import InputError
-from ..intervals import Interval
-from ..timefunction import TimeFunction
+from ..functions.intervals import Interval
+from ..functions.time import TimeFunction
+from ..functions.user_function import spread
 
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-from ..intervals import Interval
+from ..functions.intervals import Interval
 from ..kernels.base import Kernel
 from ..kernels.check import verdict
 

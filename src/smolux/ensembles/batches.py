@@ -16,20 +16,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from smolux.checks import whole
-from smolux.content import frozen
 from smolux.core.rng import streams
 from smolux.core.state import BUDGET, DONE, State
-from smolux.goal import FEWEST, Goal, named
+from smolux.functions.content import frozen
 from smolux.initial import Sizes
 from smolux.methods.base import Method
 from smolux.model import Model
-from smolux.observe import observable
-from smolux.plan import Plan
-from smolux.planning import decided
-from smolux.progress import Progress
-from smolux.replicas import Group, empty_state, initial_populations
+from smolux.runtime.progress import Progress
 from smolux.settings import Settings
-from smolux.totals import Totals, attempts_of
+from smolux.settings.target_error import FEWEST, Goal, named
+from smolux.stochastic.simulation.observe import observable
+from smolux.stochastic.simulation.plan import Plan
+from smolux.stochastic.simulation.planning import decided
+from smolux.stochastic.simulation.replicas import Group, empty_state, initial_populations
+from smolux.stochastic.simulation.totals import Totals, attempts_of
 from smolux.weighting.base import Weighting
 
 from .moments import Moments

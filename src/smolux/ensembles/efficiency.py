@@ -17,8 +17,8 @@ from smolux.deterministic.solver import solve
 from smolux.errors import InputError
 from smolux.methods.base import Method
 from smolux.model import Model
-from smolux.progress import Progress
 from smolux.results import provenance, told
+from smolux.runtime.progress import Progress
 from smolux.weighting import WeightFunction
 from smolux.weighting.base import Weighting
 

@@ -16,9 +16,9 @@ from smolux.errors import InputError, Interrupted, OutOfMemoryError
 from smolux.methods.base import Method
 from smolux.model import Model
 from smolux.model_dict import model_to_dict
-from smolux.progress import Progress
-from smolux.resources import cores
 from smolux.results import provenance, told
+from smolux.runtime.progress import Progress
+from smolux.runtime.resources import cores
 from smolux.weighting.base import Weighting
 
 from .batches import Batch, Sampler, interleaved, make_sampler

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from smolux.errors import InputError, Problem
-from smolux.intervals import Interval
-from smolux.stated import Stated
-from smolux.timefunction import TimeFunction
+from smolux.functions.intervals import Interval
+from smolux.functions.stated import Stated
+from smolux.functions.time import TimeFunction
 
 from ..checks import is_number
 from .majorant import Majorant
@@ -43,7 +43,7 @@ class Kernel:
     name : str
         The name in case files and in the registry.
     formula : str
-        The law as text, in the language of `smolux.formula`.
+        The law as text, in the language of `smolux.functions.formula`.
     cheap : bool
         Whether an evaluation costs no more than reading a table; methods then do not tabulate it.
     """

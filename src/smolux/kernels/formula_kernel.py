@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
 
-from smolux.callables import wrong_number
 from smolux.errors import InputError, Problem, about
-from smolux.formula import Formula, check_names, parse
-from smolux.laws import Law
+from smolux.functions.formula import Formula, check_names, parse
+from smolux.functions.law import Law
+from smolux.functions.user_function import wrong_number
 
 from .own import SIZES, OwnKernel
 
@@ -70,7 +70,7 @@ def formula(
     Parameters
     ----------
     text : str
-        For example ``"(i/j)**a + (j/i)**a"``; see `smolux.formula` for the language.
+        For example ``"(i/j)**a + (j/i)**a"``; see `smolux.functions.formula` for the language.
     degree : float, optional
         Homogeneity degree.
     gels : bool, optional

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from smolux.content import frozen
+from smolux.functions.content import frozen
 
 from .transition import Transition, mobility, width
 

@@ -9,10 +9,10 @@ from typing import Any, ClassVar
 
 from numpy.typing import ArrayLike
 
-from smolux.callables import Function, wrong_number
 from smolux.errors import InputError
-from smolux.laws import Law
-from smolux.stated import StatedBounds, statements
+from smolux.functions.law import Law
+from smolux.functions.stated import StatedBounds, statements
+from smolux.functions.user_function import Function, wrong_number
 
 from .own import SIZES, OwnKernel
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.boxes import subdivided
-from smolux.intervals import Interval
+from smolux.functions.bounds import subdivided
+from smolux.functions.intervals import Interval
 
 from .base import Float, widen
 

@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from smolux.intervals import Interval
-from smolux.laws import Law, proved_or_tried
+from smolux.functions.intervals import Interval
+from smolux.functions.law import Law, proved_or_tried
 
 from .base import Float, Kernel
 from .numeric import NUMBERS, always_bounded, interval_bounds, sampled_bounds

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from smolux.checks import is_number
-from smolux.content import frozen
 from smolux.errors import InputError
-from smolux.intervals import Interval
-from smolux.timefunction import TimeFunction
+from smolux.functions.content import frozen
+from smolux.functions.intervals import Interval
+from smolux.functions.time import TimeFunction
 
 from .base import Kernel, widen
 from .check import sample_sizes

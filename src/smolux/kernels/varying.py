@@ -9,8 +9,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from smolux.errors import InputError
-from smolux.intervals import Interval
-from smolux.timefunction import TimeFunction
+from smolux.functions.intervals import Interval
+from smolux.functions.time import TimeFunction
 
 from .base import Float, Kernel
 from .made import MadeOfKernels

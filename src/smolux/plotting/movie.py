@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from smolux.errors import InputError
-from smolux.files import replacing
+from smolux.runtime.files import replacing
 from smolux.spatial.result import system_of
 from smolux.spatial.trajectory import instants_of, states
 

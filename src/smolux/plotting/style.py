@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import AutoMinorLocator, Formatter, LogLocator, NullFormatter
 
 from smolux.errors import InputError
-from smolux.files import destination, replacing
+from smolux.runtime.files import destination, replacing
 
 P = ParamSpec("P")
 T = TypeVar("T")

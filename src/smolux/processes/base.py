@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from ..checks import is_number
 from ..errors import about
+from ..functions.size import SizeFunction
+from ..functions.time import TimeFunction
 from ..kernels.base import Kernel
 from ..kernels.shared import share_law
-from ..sizefunction import SizeFunction
-from ..timefunction import TimeFunction
 from .daughters import Daughters
 
 Float = NDArray[np.float64]

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..checks import is_number
 from ..errors import InputError, Problem, about
-from ..sizefunction import SizeFunction
-from ..timefunction import TimeFunction
+from ..functions.size import SizeFunction
+from ..functions.time import TimeFunction
 from .base import Float, PairProcess
 from .daughters import Debris
 

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..callables import spread
 from ..errors import about
+from ..functions.user_function import spread
 from ..kernels.base import Kernel
 from ..kernels.numeric import SAFETY
 from ..kernels.shared import pair_law

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from ..errors import about
-from ..timefunction import TimeFunction
+from ..functions.time import TimeFunction
 from .base import PairProcess
 from .daughters import Debris
 

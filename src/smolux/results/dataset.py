@@ -14,7 +14,7 @@ from xarray.indexes import PandasIndex
 from smolux import observables
 from smolux.model import Model
 from smolux.model_dict import model_to_dict
-from smolux.records import Records
+from smolux.results.records import Records
 
 from .attributes import provenance
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from smolux import __version__
 from smolux.errors import InputError
-from smolux.files import replacing
+from smolux.runtime.files import replacing
 
 from .attributes import SCHEMA, attribute
 from .reading import require
@@ -29,7 +29,7 @@ def save(ds: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
     ----------
     ds : xarray.Dataset or xarray.DataTree
     path : str or path
-        Replaced in one step if it exists; see `smolux.files.replacing`.
+        Replaced in one step if it exists; see `smolux.runtime.files.replacing`.
 
     Returns
     -------

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..errors import Problem
-from ..goal import FEWEST, Goal, named
-from ..population import POPULATIONS
 from .arguments import Arguments
 from .kinds import Choice, Flag, Number, Orders, Registered, Text, Times, Whole, setting
+from .population import POPULATIONS
+from .target_error import FEWEST, Goal, named
 
 if TYPE_CHECKING:
     from ..methods.base import Method
     from ..weighting.base import Weighting
 
-#: the replicas from this number on are pilots, see `smolux.goal`
+#: the replicas from this number on are pilots, see `smolux.settings.target_error`
 PILOT = 2**31
 #: particles that a sub-volume has at least: with less, fewer sub-volumes are used
 LEAST = 1000

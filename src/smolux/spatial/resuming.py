@@ -11,8 +11,8 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..progress import Progress
 from ..results import told
+from ..runtime.progress import Progress
 from .result import system_of, trace_of
 from .running import checked, driven
 from .windowed import Windowed

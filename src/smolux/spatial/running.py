@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import Interrupted, OutOfMemoryError, did_you_mean
-from ..progress import Progress
-from ..room import needed
+from ..runtime.progress import Progress
+from ..runtime.room import needed
+from ..runtime.stopping import AtOnce, Stopper
 from ..settings import SpatialSettings
-from ..stopping import AtOnce, Stopper
 from .method import Run, SpatialMethod
 from .methods import METHODS
 from .playing import narrate

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, Problem
-from ..room import needed
+from ..runtime.room import needed
 from .eventlog import Logger, reasons
 from .method import LISTS, Run, SpatialMethod
 from .system import System

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import numbers
 from ..errors import InputError
-from ..files import replacing
+from ..runtime.files import replacing
 from .box import Box
 from .playing import Player
 from .result import log_of, system_of

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..room import needed
+from ..runtime.room import needed
 from .eventlog import Logger, reasons
 from .method import LISTS, Run, SpatialMethod
 from .overlaps import cells_for

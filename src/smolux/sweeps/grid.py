@@ -17,9 +17,9 @@ from .. import results
 from ..analysis.gathering import gather
 from ..case import Case
 from ..errors import InputError, Interrupted, quiet
-from ..executors import adapted, completed, opened
-from ..progress import Progress
-from ..resources import available_memory
+from ..runtime.executors import adapted, completed, opened
+from ..runtime.progress import Progress
+from ..runtime.resources import available_memory
 from .over import read_axes
 from .points import Folder, Point, Sweep, make_sweep
 

@@ -19,7 +19,7 @@ import numpy as np
 from ..case import Case, parse
 from ..case.write import to_toml, value
 from ..errors import InputError
-from ..files import replacing
+from ..runtime.files import replacing
 from .over import Axis
 
 #: messages that are told of a sweep in which many points are wrong

@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..intervals import Interval
+from ..functions.intervals import Interval
+from ..functions.law import proved_or_tried
 from ..kernels.base import Kernel
 from ..kernels.majorant import Majorant
 from ..kernels.numeric import interval_bounds, sampled_bounds
-from ..laws import proved_or_tried
 
 Float = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ..intervals import Interval
+from ..functions.intervals import Interval
 from ..kernels.base import Kernel
 from ..kernels.majorant import Majorant
 from .base import Weighting

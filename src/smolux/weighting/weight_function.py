@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from ..checks import is_number
 from ..errors import InputError, Problem
-from ..intervals import Interval
+from ..functions.intervals import Interval
+from ..functions.size import SizeFunction
 from ..kernels.base import Kernel
 from ..kernels.majorant import Majorant
-from ..sizefunction import SizeFunction
 from .base import Float, Weighting
 
 #: the largest power of the size that makes sense

@@ -11,9 +11,7 @@ import numpy as np
 from ...core import rng
 from ...core.bounds import ROUNDING, note_bad, note_largest, repair
 from ...core.burst import NOT_PLAIN, PLAIN, Burst, make_draw_one
-from ...core.compile import at, cold_piece, piece
 from ...core.loop import PATIENCE, Pieces
-from ...core.prefetch import prefetch
 from ...core.slots import slot_of
 from ...core.state import (
     FIRST,
@@ -33,6 +31,8 @@ from ...core.state import (
 )
 from ...core.store import Store, pieces_of
 from ...core.together import largest_rate, takes
+from ...jit.compile import at, cold_piece, piece
+from ...jit.prefetch import prefetch
 from .levels import renew_majorant
 from .store import APART, SLACK, VAIN, renew_all, rescan, seek_apart, size_of, view, watch
 

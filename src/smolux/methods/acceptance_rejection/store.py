@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.compile import at, cold_piece, piece
 from ...core.state import (
     FIRST,
     LARGEST,
@@ -19,6 +18,7 @@ from ...core.state import (
     STORED,
     TRIALS,
 )
+from ...jit.compile import at, cold_piece, piece
 from .levels import level_of
 
 # Entries of Work.apart.

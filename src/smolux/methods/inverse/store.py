@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import rng
-from ...core.compile import cold_piece, piece
 from ...core.slots import slot_top
 from ...core.state import LARGEST, LONE_BITS, SINCE, STORED
+from ...jit.compile import cold_piece, piece
 
 
 class Work(NamedTuple):

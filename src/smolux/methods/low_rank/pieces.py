@@ -9,12 +9,12 @@ import numpy as np
 
 from ...core import rng
 from ...core.bounds import ROUNDING, note_bad, repair
-from ...core.compile import cold_piece, piece
 from ...core.loop import PATIENCE, Pieces
-from ...core.prefetch import prefetch
 from ...core.state import FIRST, FLOOR, PARTICLES, SECOND, TRIALS, VALUE, VOLUME
 from ...core.store import Store, pieces_of
 from ...core.together import largest_rate, slots_with, takes
+from ...jit.compile import cold_piece, piece
+from ...jit.prefetch import prefetch
 from .segment_tree import add, find, find_mixed
 from .store import (
     APART,

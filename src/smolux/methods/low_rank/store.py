@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.compile import cold_piece, piece
 from ...core.slots import slot_of
 from ...core.state import LARGEST, SINCE, STORED
+from ...jit.compile import cold_piece, piece
 
 # Entries of Work.meta.
 STAGE = 0  # row of the tables in force; -1: the tree is to be built

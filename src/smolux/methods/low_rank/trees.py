@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ...core.compile import cold_piece, piece
 from ...core.slots import octave
 from ...core.state import BOUND, LARGEST, PARTICLES, SINCE
+from ...jit.compile import cold_piece, piece
 from .segment_tree import build
 from .store import APART, SEEK, STAGE, WANTED, rescan
 

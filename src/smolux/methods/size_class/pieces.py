@@ -10,13 +10,13 @@ import numpy as np
 from ...core import rng
 from ...core.bounds import ROUNDING, note_bad, repair
 from ...core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
-from ...core.compile import at, cold_piece, piece
 from ...core.loop import PATIENCE, Pieces
-from ...core.prefetch import prefetch
 from ...core.state import FIRST, MAJORANT, PARTICLES, SINCE, TRIALS, VOLUME
 from ...core.store import Store, pieces_of
 from ...core.together import largest_rate, slots_with, takes
-from ...core.wide import upper_half
+from ...jit.compile import at, cold_piece, piece
+from ...jit.prefetch import prefetch
+from ...jit.wide import upper_half
 from . import alias
 from .lists import place_in, place_of_particle, size_at, size_of_particle
 from .state import AHEAD, BITS, BLOCK, FREE, NEXT, PAIRS, SLOT, SLOT_BITS, STALE, view

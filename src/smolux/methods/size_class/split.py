@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.compile import entry
 from ...core.rng import below
+from ...jit.compile import entry
 from .lists import append, is_list, place_of, size_at
 from .state import BITS, SINGLE, WIDEST, view
 

@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...core.compile import at, cold_piece, piece
 from ...core.slots import slot_of
+from ...jit.compile import at, cold_piece, piece
 from .lists import append, cut, duplicate, is_list, place_of, size_at
 from .state import AHEAD, BITS, CHUNK, FREE, NEXT, SHARE, SINGLE, STALE, WIDEST
 

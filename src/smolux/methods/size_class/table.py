@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from ...core.compile import cold_piece, piece
 from ...core.slots import slot_top
 from ...core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
+from ...jit.compile import cold_piece, piece
 from . import alias
 from .state import AHEAD, BITS, BLOCK, NEXT, PAIRS, SHARE, SPAN, STALE
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.compile import entry, piece
+from ...jit.compile import entry, piece
 from .geometry import (
     FILLED,
     NARROW,

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ...core.compile import entry, piece
 from ...core.rng import uniform
+from ...jit.compile import entry, piece
 
 
 @piece

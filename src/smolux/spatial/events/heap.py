@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...core.compile import cold_piece, piece
+from ...jit.compile import cold_piece, piece
 from .flight import (
     DISC,
     EVENT,

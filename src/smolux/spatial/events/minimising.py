@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.compile import cold_piece, piece
+from ...jit.compile import cold_piece, piece
 from .geometry import larger, shift
 from .grid import neighbour
 from .steps import (

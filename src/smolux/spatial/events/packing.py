@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...core.compile import entry, piece
+from ...jit.compile import entry, piece
 from .flight import (
     BLOCK,
     BLOCKS,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...core.compile import piece
+from ...jit.compile import piece
 from .flight import (
     AFTER,
     BEFORE,

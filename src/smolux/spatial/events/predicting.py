@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...core.compile import cold_piece, piece
+from ...jit.compile import cold_piece, piece
 from .flight import (
     AFTER,
     BLOCK,

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from ...core.compile import cold_piece, piece
+from ...jit.compile import cold_piece, piece
 from . import minimising
 from .geometry import larger, shift, smaller
 from .minimising import FAILED, FULL, LINKED, PARTED, RELOAD, root

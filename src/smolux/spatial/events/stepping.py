@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...core.compile import cold_piece, entry, piece
+from ...jit.compile import cold_piece, entry, piece
 from . import relax, steps
 from .direct import REST
 from .geometry import larger, smaller

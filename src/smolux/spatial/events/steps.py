@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.compile import cold_piece, piece
+from ...jit.compile import cold_piece, piece
 from .geometry import FILLED, larger, shift, smaller
 from .grid import insert, neighbour
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ...core.compile import cold_piece, entry, piece
+from ...jit.compile import cold_piece, entry, piece
 from . import listing, predicting
 from .flight import (
     AT_REST,

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .content import digest
-from .core.compile import CompileError, entry, user_piece
-from .kernels import FunctionKernel, Sum
-from .kernels.base import Kernel
-from .kernels.varying import Varying
-from .weighting.base import Weighting
+from ..functions.content import digest
+from ..jit.compile import CompileError, entry, user_piece
+from ..kernels import FunctionKernel, Sum
+from ..kernels.base import Kernel
+from ..kernels.varying import Varying
+from ..weighting.base import Weighting
 
 Float = NDArray[np.float64]
 

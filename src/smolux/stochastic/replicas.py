@@ -10,11 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import room
-from .assembly import bound_splits, factor_parameters, uncompilable
-from .core.compile import CompileError
-from .core.rng import streams
-from .core.state import (
+from ..core.rng import streams
+from ..core.state import (
     BAD_FACTOR,
     BAD_RATE,
     BAD_SHARE,
@@ -51,14 +48,17 @@ from .core.state import (
     new_state,
     new_tally,
 )
-from .errors import InputError
-from .initial import Sizes
-from .kernels.base import Kernel
-from .kernels.shared import WHOLE, Shared
-from .methods.base import size_of
-from .model import Model
+from ..errors import InputError
+from ..initial import Sizes
+from ..jit.compile import CompileError
+from ..kernels.base import Kernel
+from ..kernels.shared import WHOLE, Shared
+from ..methods.base import size_of
+from ..model import Model
+from ..processes.base import LoneProcess, PairProcess
+from ..runtime import room
+from .assembly import bound_splits, factor_parameters, uncompilable
 from .plan import Plan
-from .processes.base import LoneProcess, PairProcess
 from .remembered import spent
 from .windows import text_of
 
@@ -157,7 +157,7 @@ class Group:
 
     @property
     def intact(self) -> bool:
-        """Whether it could go on from what it is, see `smolux.subvolumes.Divided`."""
+        """Whether it could go on from what it is, see `smolux.stochastic.subvolumes.Divided`."""
         return True
 
     def compile(self) -> None:

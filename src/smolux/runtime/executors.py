@@ -21,7 +21,7 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
-from .errors import InputError, WorkerError
+from ..errors import InputError, WorkerError
 from .resources import cores
 
 KINDS = ("threads", "processes", "dask", "mpi")

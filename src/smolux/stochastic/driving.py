@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import InputError, Interrupted, OutOfMemoryError, WorkerError
+from ..results import to_dataset
+from ..runtime.executors import completed
+from ..runtime.progress import Progress
+from ..settings import PILOT, Control
+from ..settings.target_error import Trial, Verdict, judge, plan_replicas, shortfall
 from . import checkpoint as checkpoints
-from .errors import InputError, Interrupted, OutOfMemoryError, WorkerError
-from .executors import completed
-from .goal import Trial, Verdict, judge, plan_replicas, shortfall
 from .observe import observable, to_records
 from .plan import Plan, check_memory
-from .progress import Progress
 from .replicas import Group
-from .results import to_dataset
-from .settings import PILOT, Control
 from .subvolumes import Divided, start
 
 if TYPE_CHECKING:

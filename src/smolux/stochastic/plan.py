@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from ..core.state import Grid, Windows
+from ..errors import InputError
+from ..functions.content import frozen
+from ..initial import Initial
+from ..methods.base import Method, Rates
+from ..model import Model
+from ..observables import observed
+from ..runtime.resources import available_memory
+from ..settings import PILOT, Settings
+from ..settings.population import doubles_at
+from ..settings.target_error import Goal
+from ..weighting.base import Weighting
 from .assembly import loop_for, rates_for
-from .content import frozen
-from .core.state import Grid, Windows
-from .errors import InputError
-from .goal import Goal
-from .initial import Initial
-from .methods.base import Method, Rates
-from .model import Model
-from .observables import observed
-from .population import doubles_at
-from .resources import available_memory
-from .settings import PILOT, Settings
-from .weighting.base import Weighting
 from .windows import inflow, windows_for
 
 

@@ -11,20 +11,20 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from ..functions.content import frozen
+from ..methods.base import Method
+from ..model import Model
+from ..results import told
+from ..runtime.executors import adapted, workers_of
+from ..runtime.progress import Progress
+from ..runtime.resources import cores
+from ..settings import Control, Settings
+from ..weighting.base import Weighting
 from . import checkpoint as checkpoints
-from .content import frozen
 from .driving import Elsewhere, Threads
-from .executors import adapted, workers_of
-from .methods.base import Method
-from .model import Model
 from .planning import decided
-from .progress import Progress
 from .remembered import spent
-from .resources import cores
-from .results import told
-from .settings import Control, Settings
 from .subvolumes import start
-from .weighting.base import Weighting
 
 if TYPE_CHECKING:
     import xarray as xr

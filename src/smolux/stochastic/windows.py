@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from .callables import golden
-from .core.state import LIMIT, Windows
-from .errors import InputError
-from .kernels.base import Kernel
-from .processes import Removal, Source
-from .processes.base import PairProcess, Process
+from ..core.state import LIMIT, Windows
+from ..errors import InputError
+from ..functions.time import TimeFunction
+from ..functions.user_function import golden
+from ..kernels.base import Kernel
+from ..processes import Removal, Source
+from ..processes.base import PairProcess, Process
+from ..weighting import Number
+from ..weighting.base import Weighting
 from .remembered import timed
-from .timefunction import TimeFunction
-from .weighting import Number
-from .weighting.base import Weighting
 
 #: windows of time for bounds of a factor that varies: pieces of each octave, first octave
 _PIECES = 4

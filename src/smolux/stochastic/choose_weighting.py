@@ -15,18 +15,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .core.state import EVENTS, TRIALS
-from .costing import event_cost
-from .goal import Goal
-from .methods import SizeClass
-from .model import Model
-from .observables import recorded
+from ..core.state import EVENTS, TRIALS
+from ..methods import SizeClass
+from ..model import Model
+from ..observables import recorded
+from ..settings import Settings
+from ..settings.target_error import Goal
+from ..weighting import MassFlow, Number, WeightFunction
+from ..weighting.base import Weighting
+from .choose_method import event_cost
 from .observe import observable
 from .plan import Plan
 from .replicas import Group
-from .settings import Settings
-from .weighting import MassFlow, Number, WeightFunction
-from .weighting.base import Weighting
 
 Float = NDArray[np.float64]
 

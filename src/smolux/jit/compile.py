@@ -29,8 +29,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from ..content import INSTALLED, OPTIONS, digest, is_frozen, module_of
-from ..files import keep, kept
+from ..functions.content import INSTALLED, OPTIONS, digest, is_frozen, module_of
+from ..runtime.files import keep, kept
 from . import pipeline
 
 try:

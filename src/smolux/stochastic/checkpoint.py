@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from .content import frozen
-from .core.state import State, Tally, Windows
-from .errors import InputError
-from .files import replacing
-from .model import Model
-from .model_dict import model_from_dict, model_to_dict
-from .observables import layout
+from ..core.state import State, Tally, Windows
+from ..errors import InputError
+from ..functions.content import frozen
+from ..model import Model
+from ..model_dict import model_from_dict, model_to_dict
+from ..observables import layout
+from ..runtime.files import replacing
+from ..settings import Settings, from_plain, plain
 from .plan import Plan
 from .replicas import Group
-from .settings import Settings, from_plain, plain
 from .subvolumes import Divided, within
 
 #: what reading a file that is no checkpoint, or half of one, may raise
@@ -54,7 +54,7 @@ def _plan_from_dict(given: dict[str, Any], model: Model | None) -> Plan:
 
 
 def save(path: str | Path, plan: Plan, groups: Sequence[Group | Divided]) -> None:
-    """Write a checkpoint, whole or not at all; see `smolux.files.replacing`."""
+    """Write a checkpoint, whole or not at all; see `smolux.runtime.files.replacing`."""
     if not all(group.intact for group in groups):
         raise InputError("memory ended while sub-volumes were mixed")
     arrays: dict[str, np.ndarray] = {}

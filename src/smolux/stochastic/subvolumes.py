@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import room
-from .core.rng import stream
-from .core.state import (
+from ..core.rng import stream
+from ..core.state import (
     BUDGET,
     CLOCKS,
     DONE,
@@ -42,12 +41,13 @@ from .core.state import (
     hand_on,
     new_tally,
 )
-from .methods.base import merged, size_of
-from .observables import add_up
+from ..methods.base import merged, size_of
+from ..observables import add_up
+from ..processes.base import PairProcess
+from ..runtime import room
+from ..settings.simulation import LEAST
 from .plan import Plan
-from .processes.base import PairProcess
 from .replicas import Group, empty_state, initial_populations
-from .settings.simulation import LEAST
 
 Int = NDArray[np.int64]
 
@@ -57,7 +57,7 @@ _PART, _MIXING, _GUESS = 2, 3, 4
 
 @dataclass
 class Divided:
-    """A replica in sub-volumes; has what a `smolux.replicas.Group` of one replica has.
+    """A replica in sub-volumes; has what a `smolux.stochastic.replicas.Group` of one replica has.
 
     A stretch is the time from one mixing to the next. It depends on the state at its start, not on
     output times, and its random numbers on its number, so that a run can go on from the latest

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from .content import frozen
-from .costing import chosen_method
-from .methods import SizeClass
-from .model import Model
-from .pilot import chosen_weighting
+from ..functions.content import frozen
+from ..methods import SizeClass
+from ..model import Model
+from ..settings import Settings
+from ..settings.simulation import METHOD, WEIGHTING
+from .choose_method import chosen_method
+from .choose_weighting import chosen_weighting
 from .plan import Plan, check_memory
-from .settings import Settings
-from .settings.simulation import METHOD, WEIGHTING
 
 
 def make_plan(model: Any, times: Any, **given: Any) -> Plan:

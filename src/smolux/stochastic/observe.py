@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import observables
-from .core.state import AT, DOUBLINGS, HIGHEST
-from .goal import Goal
+from .. import observables
+from ..core.state import AT, DOUBLINGS, HIGHEST
+from ..results.records import Records
+from ..settings.target_error import Goal
 from .plan import Plan
-from .records import Records
 from .replicas import Group
 from .subvolumes import Divided
 from .totals import Totals, attempts_of

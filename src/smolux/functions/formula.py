@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import InputError, did_you_mean
+from ..errors import InputError, did_you_mean
 from .intervals import Interval
 
 #: function -> (its NumPy name, number of arguments; None: two or more)
@@ -97,7 +97,7 @@ class Formula:
         return np.broadcast_to(np.asarray(result, float), shape).copy()
 
     def interval(self, **values: Interval) -> Interval:
-        """Bounds of the formula over intervals, given by name; see `smolux.intervals`."""
+        """Bounds of the formula over intervals, given by name; see `smolux.functions.intervals`."""
         result = _function(self.text, tuple(values))(*values.values())
         return result if isinstance(result, Interval) else Interval(float(result))
 

@@ -1,8 +1,8 @@
 """A rate law of given variables: a number, a formula, a Python function or a list of values.
 
 Time, the size of a particle and the sizes of a pair differ in the ranges over which bounds are
-wanted, and in where a function is tried that nothing else bounds: see `smolux.timefunction`,
-`smolux.sizefunction` and `smolux.kernels`. All else about a law is here.
+wanted, and in where a function is tried that nothing else bounds: see `smolux.functions.time`,
+`smolux.functions.size` and `smolux.kernels`. All else about a law is here.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .callables import Function, numbers_of
-from .checks import is_number, numbers
+from ..checks import is_number, numbers
+from ..errors import InputError
 from .content import frozen
-from .errors import InputError
 from .formula import Formula, parse
 from .intervals import Interval, range_of
 from .stated import StatedBounds
+from .user_function import Function, numbers_of
 
 Float = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ class Law:
     constant : float or None
         The value, if it does not vary.
     formula : Formula or None
-    user : smolux.callables.Function or None
+    user : smolux.functions.user_function.Function or None
     values : tuple of float or None
         For the sizes 1, 2, ...; the last one holds beyond.
     operator, operands : str, tuple of Law
