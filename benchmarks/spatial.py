@@ -18,7 +18,7 @@ import numpy as np
 
 import smolux.spatial as sp
 from benchmarks.common import table, write_section
-from smolux.spatial.method import SpatialMethod
+from smolux.spatial.methods.base import SpatialMethod
 
 #: dimension, volume fraction, side of the lattice at each size
 CASES = (

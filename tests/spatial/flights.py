@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import smolux.spatial as sp
-from smolux.spatial.method import SpatialMethod
-from smolux.spatial.trace import Trace
+from smolux.spatial.methods.base import SpatialMethod
+from smolux.spatial.results.trace import Trace
 
 METHODS = {method.name: method for method in sp.METHODS if method.exact}
 

@@ -8,7 +8,7 @@ import pytest
 from flights import METHODS, assert_same, merges, run, system, wide_system
 
 import smolux.spatial as sp
-from smolux.spatial.eventlog import Logger
+from smolux.spatial.results.eventlog import Logger
 
 
 @pytest.mark.parametrize("number", range(100))

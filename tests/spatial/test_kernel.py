@@ -10,7 +10,7 @@ import smolux as sx
 import smolux.spatial as sp
 from smolux import plotting
 from smolux.plotting.spatial_kernel import _APART
-from smolux.spatial.kernel import _dataset
+from smolux.spatial.analysis.kernel import _dataset
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import smolux as sx
 import smolux.spatial as sp
 from shared import stopped
 from smolux import results
-from smolux.spatial.windowed import WindowedRun
+from smolux.spatial.methods.windowed import WindowedRun
 
 
 def merges(result):
@@ -61,7 +61,7 @@ def test_ctrl_c_leaves_what_was_reached(monkeypatch):
     # which is ignored by what a shell runs in the background
     signal.signal(signal.SIGINT, signal.default_int_handler)
     s = sp.lattice(40_000, 0.1, seed=1)
-    monkeypatch.setattr("smolux.spatial.running._BUDGET", 8000)
+    monkeypatch.setattr("smolux.spatial.simulation._BUDGET", 8000)
     advance = WindowedRun.advance
 
     def interrupted(self, *limits):

@@ -8,7 +8,8 @@ import pytest
 import smolux as sx
 import smolux.spatial as sp
 from smolux.runtime import resources, room
-from smolux.spatial import running, time_stepping, windowed
+from smolux.spatial import simulation as running
+from smolux.spatial.methods import time_stepping, windowed
 
 FINE = {"position": [[1, 1], [3, 1]], "velocity": [[1, 0], [0, 1]], "radius": 0.5, "box": 4}
 

@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 import smolux.spatial as sp
 from shared import stopped
 from smolux import InputError, SmoluxWarning
-from smolux.spatial import TimeStepping, time_stepping
+from smolux.spatial import TimeStepping
+from smolux.spatial.methods import time_stepping
 
 # a step that fails is taken again; whether one does may depend on the last bit
 pytestmark = pytest.mark.filterwarnings(

@@ -7,7 +7,7 @@ import pytest
 import synthetic
 
 from smolux.analysis import sweep_table
-from smolux.analysis.gathering import gather
+from smolux.analysis.sweeps import gather
 
 AXES = {"density": [1.0, 2.0, 4.0], "speed": [1.0, 10.0]}
 

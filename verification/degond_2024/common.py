@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 import smolux.spatial as sp
 from smolux.plotting.style import MARKERS, PALETTE
-from smolux.spatial.method import SpatialMethod
-from smolux.spatial.trace import Trace
+from smolux.spatial.methods.base import SpatialMethod
+from smolux.spatial.results.trace import Trace
 
 from ..outcome import normal_sigmas
 

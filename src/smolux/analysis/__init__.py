@@ -3,7 +3,6 @@
 from .balance import mass_balance
 from .by_rates import densities_by_rates
 from .compare import compare, verdict
-from .gathering import format_sweep, sweep_table
 from .gelation import gel_fraction, gelation
 from .moments import moments
 from .oscillations import extrema, oscillations
@@ -11,6 +10,7 @@ from .reference import exact_dataset, model_of
 from .scaling import mean_size, scaling
 from .select import series
 from .summary import summary
+from .sweeps import format_sweep, sweep_table
 from .table import format_table, tables
 
 __all__ = [

@@ -15,7 +15,7 @@ from ..case import spatial as cases
 from ..case.spatial import FIGURES, SpatialCase
 from ..errors import InputError, Interrupted, did_you_mean, quiet
 from ..runtime.stopping import ALL, Stopper
-from ..spatial.running import checked
+from ..spatial.simulation import checked
 from . import rundir
 from .console import amount, duration, say
 from .progress import Display

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from smolux.errors import InputError
-from smolux.spatial.result import system_of
+from smolux.spatial.results.result import system_of
 
 from .style import PALETTE, Width, legend_above, new_figure, styled, use_log
 

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from smolux.errors import InputError
 from smolux.runtime.files import replacing
-from smolux.spatial.result import system_of
-from smolux.spatial.trajectory import instants_of, states
+from smolux.spatial.results.result import system_of
+from smolux.spatial.results.trajectory import instants_of, states
 
 from .spatial import birth_colours, birth_norm, cluster_colours, fill
 from .style import styled

@@ -13,7 +13,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from smolux.errors import InputError
-from smolux.spatial.result import replay, system_of
+from smolux.spatial.results.result import replay, system_of
 
 from .style import GREY, PALETTE, Width, new_figure, styled, use_log
 

@@ -1,0 +1,1 @@
+"""What the machine and the user grant a run: memory, cores, workers, files; progress and stops."""

@@ -8,35 +8,35 @@ from typing import TYPE_CHECKING, Any
 #: public name -> module that defines it
 _LAZY = {
     "METHODS": "methods",
-    "AllPairs": "direct",
+    "AllPairs": "methods.direct",
     "Box": "box",
-    "Cells": "direct",
-    "Contacts": "morphology",
-    "Dimension": "dimensions",
-    "Snapshot": "morphology",
-    "SpatialProgress": "running",
+    "Cells": "methods.direct",
+    "Contacts": "analysis.morphology",
+    "Dimension": "analysis.dimensions",
+    "Snapshot": "analysis.morphology",
+    "SpatialProgress": "simulation",
     "System": "system",
-    "TimeStepping": "time_stepping",
-    "Windowed": "windowed",
+    "TimeStepping": "methods.time_stepping",
+    "Windowed": "methods.windowed",
     "bimodal_radii": "initial",
-    "box_dimension": "dimensions",
-    "contacts": "morphology",
+    "box_dimension": "analysis.dimensions",
+    "contacts": "analysis.morphology",
     "lattice": "initial",
-    "log_of": "result",
+    "log_of": "results.result",
     "lognormal_radii": "initial",
-    "mass_dimension": "dimensions",
-    "mean_field_model": "kernel",
-    "measured_kernel": "kernel",
-    "pair_distribution": "correlations",
+    "mass_dimension": "analysis.dimensions",
+    "mean_field_model": "analysis.kernel",
+    "measured_kernel": "analysis.kernel",
+    "pair_distribution": "analysis.correlations",
     "random": "initial",
-    "replay": "result",
+    "replay": "results.result",
     "resume": "resuming",
-    "shapes": "morphology",
-    "simulate": "running",
-    "snapshot": "morphology",
-    "structure_factor": "correlations",
-    "system_of": "result",
-    "write_trajectory": "trajectory",
+    "shapes": "analysis.morphology",
+    "simulate": "simulation",
+    "snapshot": "analysis.morphology",
+    "structure_factor": "analysis.correlations",
+    "system_of": "results.result",
+    "write_trajectory": "results.trajectory",
 }
 
 __all__ = [
@@ -73,21 +73,21 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
+    from .analysis.correlations import pair_distribution, structure_factor
+    from .analysis.dimensions import Dimension, box_dimension, mass_dimension
+    from .analysis.kernel import mean_field_model, measured_kernel
+    from .analysis.morphology import Contacts, Snapshot, contacts, shapes, snapshot
     from .box import Box
-    from .correlations import pair_distribution, structure_factor
-    from .dimensions import Dimension, box_dimension, mass_dimension
-    from .direct import AllPairs, Cells
     from .initial import bimodal_radii, lattice, lognormal_radii, random
-    from .kernel import mean_field_model, measured_kernel
     from .methods import METHODS
-    from .morphology import Contacts, Snapshot, contacts, shapes, snapshot
-    from .result import log_of, replay, system_of
+    from .methods.direct import AllPairs, Cells
+    from .methods.time_stepping import TimeStepping
+    from .methods.windowed import Windowed
+    from .results.result import log_of, replay, system_of
+    from .results.trajectory import write_trajectory
     from .resuming import resume
-    from .running import SpatialProgress, simulate
+    from .simulation import SpatialProgress, simulate
     from .system import System
-    from .time_stepping import TimeStepping
-    from .trajectory import write_trajectory
-    from .windowed import Windowed
 
 
 def __getattr__(name: str) -> Any:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..core.rng import streams
 from ..errors import InputError, did_you_mean
+from .analysis.overlaps import placed_at_random
 from .box import Box
-from .overlaps import placed_at_random
 from .system import System
 
 Float = NDArray[np.float64]

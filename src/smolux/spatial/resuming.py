@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from ..errors import InputError
 from ..results import told
 from ..runtime.progress import Progress
-from .result import system_of, trace_of
-from .running import checked, driven
-from .windowed import Windowed
+from .methods.windowed import Windowed
+from .results.result import system_of, trace_of
+from .simulation import checked, driven
 
 
 def resume(

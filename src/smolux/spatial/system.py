@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from .analysis.overlaps import overlapping
 from .box import Box
-from .overlaps import overlapping
 
 Float = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import smolux
 
 from .. import results
-from ..analysis.gathering import gather
+from ..analysis.sweeps import gather
 from ..case import Case
 from ..errors import InputError, Interrupted, quiet
 from ..runtime.executors import adapted, completed, opened

@@ -1,0 +1,1 @@
+"""Acceptance-rejection: pairs of equal chance, thinned by the rate over its bound."""

@@ -1,0 +1,1 @@
+"""The inverse method: both particles by cumulative sums."""

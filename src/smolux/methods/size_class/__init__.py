@@ -1,0 +1,1 @@
+"""The size-class method: pairs of classes from a frozen table."""

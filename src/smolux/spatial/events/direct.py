@@ -40,7 +40,7 @@ REST = 1e-13
 
 
 class Events(NamedTuple):
-    """Room for events, see `smolux.spatial.trace.Log`."""
+    """Room for events, see `smolux.spatial.results.trace.Log`."""
 
     time: np.ndarray
     first: np.ndarray

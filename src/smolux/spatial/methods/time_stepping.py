@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, Problem
-from ..runtime.room import needed
-from .eventlog import Logger, reasons
-from .method import LISTS, Run, SpatialMethod
-from .system import System
-from .trace import Trace, empty_series, observe
+from ...errors import InputError, Problem
+from ...runtime.room import needed
+from ..results.eventlog import Logger, reasons
+from ..results.trace import Trace, empty_series, observe
+from ..system import System
+from .base import LISTS, Run, SpatialMethod
 
 Float = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ _HOPELESS = (
 
 @cache
 def _loop(dimension: int) -> Callable[..., Any]:
-    from .events import stepping
+    from ..events import stepping
 
     return stepping.bind(dimension)
 
@@ -54,7 +54,7 @@ class SteppingRun(Run):
     """A run of the time-stepping method."""
 
     def __init__(self, system: System, times: Float, settings: TimeStepping) -> None:
-        from .events import direct, minimising, stepping, steps
+        from ..events import direct, minimising, stepping, steps
 
         n, d = system.position.shape
         self.system, self.settings = system, settings

@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .eventlog import Logger, reasons
-from .method import Run, SpatialMethod
-from .overlaps import cells_for
-from .system import System
-from .trace import Trace
+from ..analysis.overlaps import cells_for
+from ..results.eventlog import Logger, reasons
+from ..results.trace import Trace
+from ..system import System
+from .base import Run, SpatialMethod
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -25,7 +25,7 @@ _ROOM = 4096
 
 @cache
 def _loop(search: str, dimension: int) -> Callable[..., Any]:
-    from .events import direct
+    from ..events import direct
 
     return direct.bind(getattr(direct, search), dimension)
 
@@ -36,7 +36,7 @@ class DirectRun(Run):
     def __init__(
         self, system: System, search: str, cells: NDArray[np.int64], patience: float
     ) -> None:
-        from .events import direct
+        from ..events import direct
 
         n, d = system.position.shape
         contact = system.wall_contact == "surface"

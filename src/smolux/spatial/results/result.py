@@ -8,13 +8,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from .. import results
-from ..checks import numbers
-from ..errors import InputError
-from .box import Box
+from ... import results
+from ...checks import numbers
+from ...errors import InputError
+from ..box import Box
+from ..system import System
 from .genealogy import merger_tree
-from .playing import Merging, replayed
-from .system import System
+from .replay import Merging, replayed
 from .trace import ORDERS, Log, Series, Trace, size_edges
 
 Float = NDArray[np.float64]

@@ -15,11 +15,11 @@ from ..runtime.progress import Progress
 from ..runtime.room import needed
 from ..runtime.stopping import AtOnce, Stopper
 from ..settings import SpatialSettings
-from .method import Run, SpatialMethod
 from .methods import METHODS
-from .playing import narrate
+from .methods.base import Run, SpatialMethod
+from .results.replay import narrate
+from .results.trace import Trace, empty_series
 from .system import System
-from .trace import Trace, empty_series
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -249,7 +249,7 @@ def _result(
     wall: float,
     compiling: float,
 ) -> xr.DataTree:
-    from .result import to_tree
+    from .results.result import to_tree
 
     times = _default_times(trace) if output is None else output
     merging, series = None, trace.series

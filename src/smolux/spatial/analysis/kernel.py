@@ -9,11 +9,11 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import optimize
 
-from .. import kernels
-from ..errors import InputError
-from ..initial import monodisperse
-from ..model import Model
-from .result import log_of, system_of
+from ... import kernels
+from ...errors import InputError
+from ...initial import monodisperse
+from ...model import Model
+from ..results.result import log_of, system_of
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

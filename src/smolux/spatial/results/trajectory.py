@@ -11,13 +11,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import numbers
-from ..errors import InputError
-from ..runtime.files import replacing
-from .box import Box
-from .playing import Player
+from ...checks import numbers
+from ...errors import InputError
+from ...runtime.files import replacing
+from ..box import Box
+from ..system import System
+from .replay import Player
 from .result import log_of, system_of
-from .system import System
 
 Float = NDArray[np.float64]
 

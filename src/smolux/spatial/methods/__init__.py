@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from .base import SpatialMethod
 from .direct import AllPairs, Cells
-from .method import SpatialMethod
 from .time_stepping import TimeStepping
 from .windowed import Windowed
 

@@ -1,0 +1,1 @@
+"""What runs of discs in a box are read for."""
