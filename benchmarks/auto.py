@@ -18,13 +18,13 @@ from typing import Any, NamedTuple
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numpy as np
-from smolux.stochastic.simulation.plan import Plan
-from smolux.stochastic.simulation.planning import make_plan
-from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
 from benchmarks.common import loop_seconds, model, table, write_section
 from smolux.core.state import TRIALS
+from smolux.stochastic.plan import Plan
+from smolux.stochastic.planning import make_plan
+from smolux.stochastic.replicas import Group
 
 CLASSES, AR, LOW_RANK = "size-class", "acceptance-rejection", "low-rank"
 METHODS = (CLASSES, AR, LOW_RANK)

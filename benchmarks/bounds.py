@@ -23,7 +23,7 @@ import numpy as np
 
 import smolux as sx
 from benchmarks.common import table, write_section
-from smolux.stochastic.simulation import remembered, tables
+from smolux.stochastic import remembered, tables
 
 _REPEATS = 5
 

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from smolux.stochastic.simulation.planning import make_plan
-from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
+from smolux.stochastic.planning import make_plan
+from smolux.stochastic.replicas import Group
 
 RESULTS = Path(__file__).with_name("RESULTS.md")
 

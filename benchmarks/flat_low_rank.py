@@ -19,8 +19,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import numba
 import numpy as np
-from smolux.methods.low_rank.method.majorants import from_powers
-from smolux.methods.low_rank.method.segment_tree import levels_of
 
 import smolux as sx
 from benchmarks.common import group_of, interleaved, loop_seconds, model, table, write_section
@@ -28,6 +26,8 @@ from benchmarks.flat import stream
 from smolux.core import rng
 from smolux.core.slots import slot_edges, slot_of
 from smolux.core.state import TRIALS
+from smolux.methods.low_rank.majorants import from_powers
+from smolux.methods.low_rank.segment_tree import levels_of
 
 _BITS = 6
 _COUNTED = 2 << _BITS

@@ -53,7 +53,8 @@ def digest(loop: object) -> dict[str, object]:
 def loops(only: str) -> dict[str, dict[str, object]]:
     """Compile the loop of each golden trajectory that has `only` in its name."""
     import golden
-    from smolux.stochastic.simulation.replicas import Group
+
+    from smolux.stochastic.replicas import Group
 
     found = {}
     for case, (*arguments, policy, _) in golden.CASES.items():

@@ -11,7 +11,7 @@ from smolux.case import parse
 from smolux.cli import checking, estimate
 from smolux.errors import InputError
 from smolux.runtime import executors
-from smolux.stochastic.simulation import plan
+from smolux.stochastic import plan
 
 
 def case(kernel: str, run: str = "times = [2]", rest: str = ""):

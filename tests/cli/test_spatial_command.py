@@ -9,7 +9,7 @@ from command import call
 from smolux import results
 from smolux.case import load, spatial
 from smolux.errors import InputError, SmoluxWarning
-from smolux.spatial import lognormal_radii, random, running, simulate
+from smolux.spatial import lognormal_radii, random, simulate, simulation
 
 CASE = """\
 title = "few discs"
@@ -53,7 +53,7 @@ def test_a_case_from_run_to_movie(folder):
 
 
 def test_the_time_limit_stops_and_goes_on(folder, monkeypatch):
-    monkeypatch.setattr(running, "_BUDGET", 20)
+    monkeypatch.setattr(simulation, "_BUDGET", 20)
     (folder / "cut.toml").write_text(CASE.replace("seed = 2", "seed = 2\ntime_limit = 1e-9"))
     stderr = call("run", "cut.toml", code=3).stderr
     assert "the time limit of 1e-09 s is reached; what was reached is in cut" in stderr

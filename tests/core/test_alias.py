@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from smolux.core.rng import bits, streams
-from smolux.methods.size_class.method import alias
+from smolux.methods.size_class import alias
 
 
 @numba.njit

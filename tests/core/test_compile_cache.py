@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from smolux.stochastic.simulation.assembly import _key, loop_for
 
 import smolux as sx
 from smolux.functions.content import digest
@@ -23,6 +22,7 @@ from smolux.jit import compile as compiling
 from smolux.jit.compile import cache_directory, statistics
 from smolux.runtime import files
 from smolux.runtime.files import kept
+from smolux.stochastic.assembly import _key, loop_for
 from smolux.weighting import WEIGHTINGS, Number
 
 #: a function with everything that an edit may touch

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from smolux.methods.acceptance_rejection.method.levels import level_edges, level_of
-from smolux.methods.inverse.method.sums import BLOCK, find, find_large, shift, weigh
 
 from smolux.core.state import LIMIT
 from smolux.jit.compile import entry
+from smolux.methods.acceptance_rejection.levels import level_edges, level_of
+from smolux.methods.inverse.sums import BLOCK, find, find_large, shift, weigh
 
 EDGES = level_edges()
 

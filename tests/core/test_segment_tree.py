@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from smolux.methods.low_rank.method.segment_tree import (
+
+from smolux.core.slots import octave, slot_edges, slot_of
+from smolux.methods.low_rank.segment_tree import (
     FANOUT,
     add,
     build,
@@ -15,8 +17,6 @@ from smolux.methods.low_rank.method.segment_tree import (
     find_mixed,
     levels_of,
 )
-
-from smolux.core.slots import octave, slot_edges, slot_of
 
 _build = numba.njit(lambda tree, levels, row: build(tree, levels, row))
 _add = numba.njit(lambda tree, levels, row, slots, weights: add(tree, levels, row, slots, weights))

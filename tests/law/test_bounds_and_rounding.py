@@ -10,13 +10,13 @@ import laws
 import numpy as np
 import pytest
 from scipy import stats
-from smolux.stochastic.simulation.planning import make_plan
-from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
 from shared import EVERY, Low, extinction, repaired
 from smolux.core.state import EVENTS, LARGEST, MONOMERS, SMALLEST, STORED
 from smolux.kernels.formula_kernel import FormulaKernel
+from smolux.stochastic.planning import make_plan
+from smolux.stochastic.replicas import Group
 
 
 class OneUnitLow(FormulaKernel):

@@ -8,8 +8,6 @@ from typing import Any
 import laws
 import numpy as np
 import pytest
-from smolux.stochastic.simulation.planning import make_plan
-from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
 from shared import extinction
@@ -17,6 +15,8 @@ from smolux import exact
 from smolux.core.state import TRIALS
 from smolux.kernels import Kernel, Majorant
 from smolux.kernels.formula_kernel import FormulaKernel
+from smolux.stochastic.planning import make_plan
+from smolux.stochastic.replicas import Group
 
 pytestmark = extinction
 

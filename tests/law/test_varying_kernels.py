@@ -5,9 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from smolux.stochastic.simulation.planning import make_plan
-from smolux.stochastic.simulation.replicas import Group
-from smolux.stochastic.simulation.windows import windows_for
 from tests.shared import FORMULA, QUICK, extinction
 
 import smolux as sx
@@ -20,7 +17,10 @@ from smolux.exact import finite
 from smolux.exact.find import solution
 from smolux.kernels import Sum, from_dict
 from smolux.methods.choose import unforeseen
-from smolux.stochastic.simulation import checkpoint as checkpoints
+from smolux.stochastic import checkpoint as checkpoints
+from smolux.stochastic.planning import make_plan
+from smolux.stochastic.replicas import Group
+from smolux.stochastic.windows import windows_for
 
 P = sx.processes
 #: the choice by the sum is the loop's and not the method's: one method is quick to compile

@@ -12,11 +12,11 @@ import chains
 import laws
 import numpy as np
 import pytest
-from smolux.stochastic.simulation.assembly import rates_for
 
 import smolux as sx
 from shared import QUICK, extinction
 from smolux.errors import InputError
+from smolux.stochastic.assembly import rates_for
 
 METHODS = [method.name for method in sx.methods.METHODS]
 #: the law of `MassFlow`, which is compiled without a power; see `test_processes`

@@ -8,13 +8,13 @@ from typing import Any
 import chains
 import laws
 import pytest
-from smolux.stochastic.simulation.planning import make_plan
-from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
 from shared import EVERY, extinction, laborious, repaired
 from smolux.core.state import TRIALS
 from smolux.methods import METHODS
+from smolux.stochastic.planning import make_plan
+from smolux.stochastic.replicas import Group
 
 pytestmark = [extinction, laborious]
 

@@ -20,12 +20,12 @@ if __name__ == "__main__":
 
 import runs
 from flights import run, system
-from smolux.stochastic.simulation.plan import Plan
-from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
 from shared import VARYING
 from smolux.core.state import DOUBLINGS, EXTINCT, PENDING, TIME, TRIALS, VOLUME
+from smolux.stochastic.plan import Plan
+from smolux.stochastic.replicas import Group
 
 PATH = Path(__file__).parent / "data" / "golden.json"
 P = sx.processes

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from smolux.stochastic.simulation.plan import Plan
-from smolux.stochastic.simulation.planning import make_plan
-from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
 from shared import FORMULA, QUICK, VARYING
-from smolux.stochastic.simulation import checkpoint as checkpoints
+from smolux.stochastic import checkpoint as checkpoints
+from smolux.stochastic.plan import Plan
+from smolux.stochastic.planning import make_plan
+from smolux.stochastic.replicas import Group
 
 METHODS = [method.name for method in sx.methods.METHODS]
 #: the method, and whether the rate varies: its loop is another one

@@ -10,7 +10,7 @@ import pytest
 
 import smolux as sx
 from smolux.errors import InputError
-from smolux.stochastic.simulation import plan, planning
+from smolux.stochastic import plan, planning
 
 MODEL = sx.Model(sx.kernels.Constant())
 

@@ -9,9 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from smolux.stochastic.simulation.choose_method import event_cost
-from smolux.stochastic.simulation.plan import Plan
-from smolux.stochastic.simulation.planning import make_plan
 
 import smolux as sx
 from shared import FORMULA
@@ -19,8 +16,11 @@ from smolux import case as cases
 from smolux.cli import running
 from smolux.errors import InputError
 from smolux.settings.target_error import Goal
-from smolux.stochastic.simulation import checkpoint, planning
-from smolux.stochastic.simulation import choose_weighting as pilot
+from smolux.stochastic import checkpoint, planning
+from smolux.stochastic import choose_weighting as pilot
+from smolux.stochastic.choose_method import event_cost
+from smolux.stochastic.plan import Plan
+from smolux.stochastic.planning import make_plan
 
 METHOD = "acceptance-rejection"
 KERNEL = sx.kernels.formula(FORMULA, c0=1.0, c1=0.0, c2=0.0, c3=0.0)

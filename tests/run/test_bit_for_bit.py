@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 import runs
-from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
 from shared import EVERY, QUICK, VARYING
-from smolux.stochastic.simulation import replicas
-from smolux.stochastic.simulation import simulation as stochastic
+from smolux.stochastic import replicas
+from smolux.stochastic import simulation as stochastic
+from smolux.stochastic.replicas import Group
 
 every_method = pytest.mark.parametrize("method", EVERY)
 TIMES = [0.5, 3.0]

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 import runs
-from smolux.stochastic.simulation.assembly import rates_for
 
 import smolux as sx
 from smolux.functions.law import Law
 from smolux.kernels import Additive
 from smolux.runtime import files
-from smolux.stochastic.simulation import remembered, tables
+from smolux.stochastic import remembered, tables
+from smolux.stochastic.assembly import rates_for
 from smolux.weighting import MassFlow, Number, WeightFunction
 
 BOXES = [np.array(side, float) for side in ([1, 2, 9], [1, 3, 11], [2, 2, 40], [4, 3, 47])]

@@ -11,14 +11,14 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
-from smolux.stochastic.simulation.planning import make_plan
-from smolux.stochastic.simulation.windows import windows_for
 
 import smolux as sx
 from smolux import processes
 from smolux.deterministic.splitting import Splits
 from smolux.functions.content import digest, frozen, is_frozen
 from smolux.jit.compile import user_piece
+from smolux.stochastic.planning import make_plan
+from smolux.stochastic.windows import windows_for
 
 slow = pytest.mark.slow
 METHODS = [

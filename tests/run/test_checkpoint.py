@@ -19,8 +19,8 @@ from shared import EVERY, QUICK, VARYING
 from smolux.core.state import BUDGET, GROW
 from smolux.errors import InputError, Interrupted
 from smolux.runtime import resources, room
-from smolux.stochastic.simulation import checkpoint as checkpoints
-from smolux.stochastic.simulation import replicas
+from smolux.stochastic import checkpoint as checkpoints
+from smolux.stochastic import replicas
 
 pytestmark = shared.stopped
 slow = pytest.mark.slow

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from smolux.stochastic.simulation.plan import Plan
-from smolux.stochastic.simulation.planning import make_plan
-from smolux.stochastic.simulation.windows import windows_for
 
 import smolux as sx
 from smolux import processes
 from smolux.cli.estimate import Pilot
+from smolux.stochastic.plan import Plan
+from smolux.stochastic.planning import make_plan
+from smolux.stochastic.windows import windows_for
 
 
 def planned(

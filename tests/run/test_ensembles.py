@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy import stats
-from smolux.stochastic.simulation.planning import make_plan
 
 import smolux as sx
 from shared import FORMULA, extinction
@@ -24,6 +23,7 @@ from smolux.ensembles.ensemble import Collected
 from smolux.errors import InputError
 from smolux.exact import finite
 from smolux.settings.target_error import Goal
+from smolux.stochastic.planning import make_plan
 
 METHOD = "acceptance-rejection"
 MODEL = sx.Model(kernel=sx.kernels.Constant())

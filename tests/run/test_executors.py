@@ -25,8 +25,8 @@ import smolux as sx
 from smolux.errors import InputError, Interrupted, WorkerError
 from smolux.runtime import executors
 from smolux.runtime.executors import RETRIES, _renewed, completed, opened
-from smolux.stochastic.simulation import driving, replicas
-from smolux.stochastic.simulation import simulation as stochastic
+from smolux.stochastic import driving, replicas
+from smolux.stochastic import simulation as stochastic
 
 
 class InThisProcess(Executor):

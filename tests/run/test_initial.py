@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import runs
 from scipy import stats
-from smolux.stochastic.simulation.replicas import initial_populations
 
 import smolux as sx
 from shared import QUICK
 from smolux.case import parse
 from smolux.cli.estimate import physics_warnings
 from smolux.initial import base
+from smolux.stochastic.replicas import initial_populations
 
 INITIALS = {
     "monomers": sx.initial.monodisperse(density=2.0),

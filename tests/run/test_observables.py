@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 import runs
-from smolux.stochastic.simulation.replicas import empty_state
 
 import shared
 import smolux as sx
@@ -22,7 +21,8 @@ from smolux.core.columns import Columns, Rule
 from smolux.core.state import AT, EVENTS, HIGHEST, MASS_OUT, TRIALS
 from smolux.observables import OBSERVABLES, Observable
 from smolux.results.dataset import VARIABLES
-from smolux.stochastic.simulation import checkpoint as checkpoints
+from smolux.stochastic import checkpoint as checkpoints
+from smolux.stochastic.replicas import empty_state
 
 DOCS = Path(__file__).parents[2] / "docs"
 

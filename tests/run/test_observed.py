@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 import runs
-from smolux.stochastic.simulation.observe import observable, to_records
-from smolux.stochastic.simulation.replicas import Group
-from smolux.stochastic.simulation.totals import attempts_of
 
 import smolux as sx
 from shared import QUICK
 from smolux.core.state import COUNTS, TRIALS
 from smolux.results import to_dataset
+from smolux.stochastic.observe import observable, to_records
+from smolux.stochastic.replicas import Group
+from smolux.stochastic.totals import attempts_of
 
 DENSITY, PARTICLES = 2.5, 4000
 #: standard errors by which a mean may be off

@@ -11,21 +11,21 @@ from typing import Any
 import numpy as np
 import pytest
 import runs
-from smolux.methods.acceptance_rejection.method.pieces import SLACK
-from smolux.methods.low_rank.method.store import POOL_NEEDED, TAIL
-from smolux.methods.size_class.method.state import CHUNK, FREE
-from smolux.stochastic.simulation.planning import make_plan
-from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
 from smolux import processes
 from smolux.core.state import GROW, STORED
 from smolux.methods import base
-from smolux.methods.acceptance_rejection.method import method as acceptance_rejection
-from smolux.methods.inverse.method import method as inverse
-from smolux.methods.low_rank.method import method as low_rank
-from smolux.methods.size_class.method import method as size_class
+from smolux.methods.acceptance_rejection import method as acceptance_rejection
+from smolux.methods.acceptance_rejection.pieces import SLACK
+from smolux.methods.inverse import method as inverse
+from smolux.methods.low_rank import method as low_rank
+from smolux.methods.low_rank.store import POOL_NEEDED, TAIL
+from smolux.methods.size_class import method as size_class
+from smolux.methods.size_class.state import CHUNK, FREE
 from smolux.runtime import files
+from smolux.stochastic.planning import make_plan
+from smolux.stochastic.replicas import Group
 
 slow = pytest.mark.slow
 METHODS = [

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 import runs
-from smolux.stochastic.simulation.replicas import Group
-from smolux.stochastic.simulation.subvolumes import Divided
 
 import shared
 import smolux as sx
@@ -20,7 +18,9 @@ from smolux.errors import InputError, SmoluxWarning
 from smolux.exact import finite
 from smolux.runtime import resources, room
 from smolux.settings import simulation
-from smolux.stochastic.simulation import subvolumes
+from smolux.stochastic import subvolumes
+from smolux.stochastic.replicas import Group
+from smolux.stochastic.subvolumes import Divided
 
 pytestmark = shared.stopped
 

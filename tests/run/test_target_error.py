@@ -11,9 +11,6 @@ import numpy as np
 import pytest
 import runs
 from scipy import stats
-from smolux.stochastic.simulation.observe import observable
-from smolux.stochastic.simulation.plan import PILOT
-from smolux.stochastic.simulation.planning import make_plan
 
 import shared
 import smolux as sx
@@ -22,8 +19,11 @@ from smolux.core.state import new_tally
 from smolux.errors import InputError, SmoluxWarning
 from smolux.observables import recorded
 from smolux.settings.target_error import Goal, Trial, judge, plan_replicas
-from smolux.stochastic.simulation import driving, replicas
-from smolux.stochastic.simulation import simulation as stochastic
+from smolux.stochastic import driving, replicas
+from smolux.stochastic import simulation as stochastic
+from smolux.stochastic.observe import observable
+from smolux.stochastic.plan import PILOT
+from smolux.stochastic.planning import make_plan
 
 pytestmark = shared.stopped
 

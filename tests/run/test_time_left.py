@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 import runs
-from smolux.stochastic.simulation.driving import Run
 
 from shared import QUICK
+from smolux.stochastic.driving import Run
 
 
 def test_the_time_left_is_what_the_rest_will_take() -> None:

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 import runs
 from scipy import stats
-from smolux.stochastic.simulation.replicas import Group
 
 import smolux as sx
 from shared import QUICK, extinction
@@ -21,7 +20,8 @@ from smolux.errors import InputError, SmoluxWarning
 from smolux.functions.time import TimeFunction
 from smolux.kernels.formula_kernel import FormulaKernel
 from smolux.runtime import files
-from smolux.stochastic.simulation import assembly
+from smolux.stochastic import assembly
+from smolux.stochastic.replicas import Group
 
 every_method = pytest.mark.parametrize(
     "method",

@@ -8,7 +8,7 @@ import pytest
 import smolux as sx
 import smolux.spatial as sp
 from smolux.runtime import resources, room
-from smolux.spatial import simulation as running
+from smolux.spatial import simulation
 from smolux.spatial.methods import time_stepping, windowed
 
 FINE = {"position": [[1, 1], [3, 1]], "velocity": [[1, 0], [0, 1]], "radius": 0.5, "box": 4}
@@ -212,7 +212,7 @@ def test_the_clock_and_the_memory_stop_a_run(why, monkeypatch):
         monkeypatch.setattr(resources, "free_memory", lambda: 0.0)
     else:
         given["time_limit"] = 1e-9
-    monkeypatch.setattr(running, "_BUDGET", 20)
+    monkeypatch.setattr(simulation, "_BUDGET", 20)
     with pytest.warns(sx.SmoluxWarning, match=why):
         cut = sp.simulate(s, **given)
     monkeypatch.undo()
@@ -234,7 +234,7 @@ def test_lists_that_would_outgrow_the_memory_stop_a_run(full, monkeypatch):
         monkeypatch.setattr(windowed, full, 0)
         monkeypatch.setattr(windowed, "_THIN", 2.0)
     monkeypatch.setattr(room, "_SMALL", 1)
-    monkeypatch.setattr(running, "_EVENT", 0)
+    monkeypatch.setattr(simulation, "_EVENT", 0)
     monkeypatch.setattr(resources, "free_memory", lambda: 0.0)
     with pytest.warns(sx.SmoluxWarning, match="memory: lists of discs that may meet need "):
         cut = sp.simulate(s, **given)

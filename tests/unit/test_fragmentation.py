@@ -15,7 +15,7 @@ from smolux.core.slots import slot_edges
 from smolux.core.state import LONE_BITS, State, new_state
 from smolux.functions.user_function import Function
 from smolux.processes import Fragmentation
-from smolux.stochastic.simulation import assembly
+from smolux.stochastic import assembly
 
 #: any power of the product, in one compiled function
 LAW = "(i*j)**p"

@@ -6,7 +6,6 @@ import json
 
 import numpy as np
 import pytest
-from smolux.stochastic.simulation.planning import make_plan
 
 import smolux as sx
 from smolux.deterministic import SolverError
@@ -19,6 +18,7 @@ from smolux.deterministic.terms import Totals
 from smolux.deterministic.timemesh import TimeMesh
 from smolux.deterministic.window import Window
 from smolux.errors import InputError, Interrupted, SmoluxWarning
+from smolux.stochastic.planning import make_plan
 
 AGGREGATION = sx.processes.Aggregation()
 

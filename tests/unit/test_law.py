@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from smolux.stochastic.simulation.windows import windows_for
 
 import smolux as sx
 from smolux.errors import InputError
@@ -21,6 +20,7 @@ from smolux.functions.user_function import numbers_of
 from smolux.kernels import formula, from_function
 from smolux.model_dict import model_from_dict, model_to_dict
 from smolux.processes import Aggregation, Removal, Shattering
+from smolux.stochastic.windows import windows_for
 
 HOURS = np.array([0.0, 7.0, 7.01, 7.02, 100.0])
 FLOW = np.array([0.5, 0.0, 50.0, 0.0, 2.0])

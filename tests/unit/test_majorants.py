@@ -6,12 +6,12 @@ from itertools import product
 
 import numpy as np
 import pytest
-from smolux.methods.low_rank.method.majorants import fill_bounds, fitted, from_powers
-from smolux.stochastic.simulation.assembly import rates_for
 
 import smolux as sx
 from smolux.core.slots import slot_edges
 from smolux.kernels import KERNELS, Kernel, Majorant
+from smolux.methods.low_rank.majorants import fill_bounds, fitted, from_powers
+from smolux.stochastic.assembly import rates_for
 from smolux.weighting import Number
 
 #: no scale is one, which hides what lacks it

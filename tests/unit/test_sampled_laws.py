@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from smolux.stochastic.simulation.windows import windows_for
 
 from smolux import kernels
 from smolux.functions.time import TimeFunction
 from smolux.processes import Removal
+from smolux.stochastic.windows import windows_for
 
 TABLE = np.array([0.0, 7.0, 7.01, 7.02, 100.0])
 VALUES = np.array([0.0, 0.0, 50.0, 0.0, 0.0])

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from smolux.stochastic.simulation.planning import make_plan
 
 import smolux as sx
 from smolux import case as cases
@@ -24,6 +23,7 @@ from smolux.settings import (
     from_plain,
     plain,
 )
+from smolux.stochastic.planning import make_plan
 
 MODEL = sx.Model(sx.kernels.Constant())
 CASE = '[kernel]\nname = "constant"\n'

@@ -1,6 +1,7 @@
 """How often the intervals of few replicas hold: measured over thousands of groups of replicas."""
 
-from ..suite import Suite
+from verification.suite import Suite
+
 from . import replicas, stopping
 
 SUITE = Suite(

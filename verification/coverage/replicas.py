@@ -15,8 +15,8 @@ from smolux.confidence import (
     variance_interval,
     variance_vague,
 )
+from verification.outcome import Check, Item, Outcome, Table
 
-from ..outcome import Check, Item, Outcome, Table
 from .common import MODELS, PARTICLES, REPLICAS, groups, sampled
 
 SIZES = (4, 8, 16, 32)

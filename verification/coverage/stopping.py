@@ -8,8 +8,8 @@ import numpy as np
 
 from smolux.confidence import Sample, mean_interval
 from smolux.settings.target_error import Goal, judge, plan_replicas
+from verification.outcome import Check, Item, Outcome, Table
 
-from ..outcome import Check, Item, Outcome, Table
 from .common import REPLICAS, sampled
 
 #: kernel, observable and target

@@ -2,6 +2,6 @@
 
 import sys
 
-from ..run import main
+from verification.run import main
 
 raise SystemExit(main(["degond_2024", *sys.argv[1:]]))

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from smolux.plotting.style import PALETTE, new_figure, styled, use_log
+from verification.outcome import Check, Item, Outcome, Table, at_most
 
-from ..outcome import Check, Item, Outcome, Table, at_most
 from . import ensemble
 from .common import EVENTS, METHODS, NAME
 from .ensemble import values

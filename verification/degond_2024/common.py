@@ -17,8 +17,7 @@ import smolux.spatial as sp
 from smolux.plotting.style import MARKERS, PALETTE
 from smolux.spatial.methods.base import SpatialMethod
 from smolux.spatial.results.trace import Trace
-
-from ..outcome import normal_sigmas
+from verification.outcome import normal_sigmas
 
 TARGETS = Path(__file__).parent / "targets"
 #: volume fractions; those of the paper are not legible in the text that we have

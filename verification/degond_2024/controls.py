@@ -9,8 +9,7 @@ import numpy as np
 
 import smolux.spatial as sp
 from smolux.plotting.style import new_figure, styled, use_log
-
-from ..outcome import Check, Item, Outcome, Table, at_most
+from verification.outcome import Check, Item, Outcome, Table, at_most
 
 #: number of discs of the first two, and levels of the third: 3^8 = 6561 discs
 _SIDE, _LEVEL = 81, 8

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 import smolux.spatial as sp
+from verification.outcome import Check, Item, Outcome, Table, at_most
 
-from ..outcome import Check, Item, Outcome, Table, at_most
 from .common import Finished, compiled, run
 
 _SIZES, _LARGE = (100, 400, 900), 400

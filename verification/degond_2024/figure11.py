@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from smolux.plotting.style import GREY, new_figure, styled, use_linear, use_log
+from verification.outcome import Check, Item, Outcome, Table, at_most, worst
 
-from ..outcome import Check, Item, Outcome, Table, at_most, worst
 from . import ensemble
 from .common import (
     EVENTS,

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from smolux.plotting.style import GREY, new_figure, styled, use_linear, use_log
+from verification.outcome import Check, Item, Outcome, Table, at_most, worst
 
-from ..outcome import Check, Item, Outcome, Table, at_most, worst
 from . import ensemble
 from .common import (
     EVENTS,

@@ -8,8 +8,8 @@ import numpy as np
 from scipy import stats
 
 from smolux.plotting.style import new_figure, styled, use_log
+from verification.outcome import Check, Item, Outcome, Table, worst
 
-from ..outcome import Check, Item, Outcome, Table, worst
 from . import ensemble
 from .common import EVENTS, LABEL, LOOK, METHODS, NAME, target
 from .ensemble import values

@@ -8,8 +8,8 @@ import numpy as np
 
 import smolux.spatial as sp
 from smolux.plotting.style import MARKERS, PALETTE, new_figure, styled, use_linear, use_log
+from verification.outcome import Check, Item, Outcome, Table, at_most
 
-from ..outcome import Check, Item, Outcome, Table, at_most
 from .common import compiled, run, target
 
 DISCS, FRACTIONS, SEED = 250_000, (0.02, 0.1, 0.3), 11

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from smolux.plotting.style import GREY, PALETTE, new_figure, styled, use_linear
+from verification.outcome import Check, Item, Outcome, Table, at_most, worst
 
-from ..outcome import Check, Item, Outcome, Table, at_most, worst
 from . import ensemble
 from .common import COLOUR, EVENTS, LABEL, METHODS, NAME, against_known, target
 from .ensemble import WITHIN, values

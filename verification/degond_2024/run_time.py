@@ -8,8 +8,8 @@ import numpy as np
 
 import smolux.spatial as sp
 from smolux.plotting.style import MARKERS, PALETTE, new_figure, styled, use_log
+from verification.outcome import Check, Item, Outcome, Table
 
-from ..outcome import Check, Item, Outcome, Table
 from .common import compiled, run, target
 from .exactness import _same
 

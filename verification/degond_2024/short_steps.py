@@ -8,8 +8,8 @@ import numpy as np
 
 import smolux.spatial as sp
 from smolux.plotting.style import PALETTE, new_figure, styled, use_linear
+from verification.outcome import Check, Item, Outcome, Table, worst
 
-from ..outcome import Check, Item, Outcome, Table, worst
 from .common import against_known, compiled, mean_and_error, run, target
 from .ensemble import TOLERANCES, WITHIN, contacts_within
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..suite import Suite
+from verification.suite import Suite
+
 from . import extinction, figure1, hopf, oscillations, ramp, run_time, table1, table2
 
 SUITE = Suite(

@@ -10,8 +10,8 @@ from scipy import stats
 
 import smolux as sx
 from smolux.plotting.style import PALETTE, new_figure, styled, use_linear, use_log
+from verification.outcome import Check, Item, Outcome, Table, at_most, mean_sigmas, worst
 
-from ..outcome import Check, Item, Outcome, Table, at_most, mean_sigmas, worst
 from .common import AR, brownian, curves, simulate
 
 #: when a few large clusters are left they meet at a rate of order 1/N, so the end must be late

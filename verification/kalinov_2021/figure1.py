@@ -8,8 +8,8 @@ import numpy as np
 
 import smolux as sx
 from smolux.plotting.style import PALETTE, new_figure, styled, use_linear, use_log
+from verification.outcome import Item, Outcome, Table, at_most, mean_sigmas, worst
 
-from ..outcome import Item, Outcome, Table, at_most, mean_sigmas, worst
 from .common import AR, INVERSE, LABEL, METHODS, ballistic, curves, simulate, target
 
 TIME = 10.0

@@ -9,8 +9,8 @@ import numpy as np
 
 import smolux as sx
 from smolux.plotting.style import PALETTE, new_figure, styled, use_linear
+from verification.outcome import Item, Outcome, Table, at_most
 
-from ..outcome import Item, Outcome, Table, at_most
 from .common import curves
 
 EXPONENTS = (0.8, 0.85, 0.9, 0.925, 0.95, 0.98, 1.0)

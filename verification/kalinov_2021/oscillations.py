@@ -11,8 +11,17 @@ import numpy as np
 import smolux as sx
 from smolux.analysis.oscillations import extrema
 from smolux.plotting.style import PALETTE, new_figure, styled, use_linear
+from verification.outcome import (
+    Check,
+    Item,
+    Outcome,
+    Table,
+    at_most,
+    mean_sigmas,
+    normal_sigmas,
+    worst,
+)
 
-from ..outcome import Check, Item, Outcome, Table, at_most, mean_sigmas, normal_sigmas, worst
 from .common import (
     AR,
     LABEL,

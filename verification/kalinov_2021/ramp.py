@@ -8,8 +8,8 @@ import numpy as np
 
 import smolux as sx
 from smolux.plotting.style import new_figure, styled, use_linear
+from verification.outcome import Check, Item, Outcome, Table, at_most, mean_sigmas, worst
 
-from ..outcome import Check, Item, Outcome, Table, at_most, mean_sigmas, worst
 from .common import AR, LABEL, METHODS, brownian, curves, draw_first_runs, second_moments
 
 RATE = "0.01 * (1 - t/400)"

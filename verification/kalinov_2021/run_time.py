@@ -11,8 +11,8 @@ import numpy as np
 
 import smolux as sx
 from smolux.plotting.style import MARKERS, PALETTE, new_figure, styled, use_log
+from verification.outcome import Check, Item, Outcome, Table
 
-from ..outcome import Check, Item, Outcome, Table
 from .common import AR, INVERSE, LABEL, METHODS, ballistic, constant, loop_seconds, target
 
 TIMES = (1.0, 10.0, 100.0)

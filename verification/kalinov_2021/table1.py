@@ -8,8 +8,8 @@ import numpy as np
 
 import smolux as sx
 from smolux.plotting.style import MARKERS, PALETTE, new_figure, styled, use_log
+from verification.outcome import Check, Item, Outcome, Table, rms, worst
 
-from ..outcome import Check, Item, Outcome, Table, rms, worst
 from .common import AR, INVERSE, LABEL, METHODS, constant, simulate, target
 
 TIMES = (1.0, 10.0, 100.0)

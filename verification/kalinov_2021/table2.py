@@ -9,8 +9,8 @@ import numpy as np
 
 import smolux as sx
 from smolux.plotting.style import MARKERS, PALETTE, new_figure, styled, use_log
+from verification.outcome import Check, Item, Outcome, Table, at_most, mean_sigmas, rms, worst
 
-from ..outcome import Check, Item, Outcome, Table, at_most, mean_sigmas, rms, worst
 from . import table2_paper
 from .common import AR, INVERSE, LABEL, METHODS, ballistic, simulate, target
 from .table2_paper import Judged, judge, unit

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from ..outcome import Check, Table, worst
+from verification.outcome import Check, Table, worst
 
 #: numbers of runs the paper may have taken
 _COUNTS = (2, 3, 4, 6, 8, 10, 15, 20, 30, 50, 100, 200)

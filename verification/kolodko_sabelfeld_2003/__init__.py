@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..suite import Suite
+from verification.suite import Suite
+
 from . import bands, choice, cost, efficiency, evaporation, tables2
 
 SUITE = Suite(

@@ -2,6 +2,6 @@
 
 import sys
 
-from ..run import main
+from verification.run import main
 
 raise SystemExit(main(["kolodko_sabelfeld_2003", *sys.argv[1:]]))

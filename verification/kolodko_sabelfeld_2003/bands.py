@@ -9,8 +9,8 @@ import numpy as np
 
 import smolux as sx
 from smolux.plotting.style import new_figure, styled, time_label, use_log
+from verification.outcome import Check, Item, Outcome, Table, worst
 
-from ..outcome import Check, Item, Outcome, Table, worst
 from .common import (
     AR,
     AUTO,

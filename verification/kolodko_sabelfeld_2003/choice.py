@@ -9,8 +9,8 @@ import numpy as np
 
 import smolux as sx
 from smolux.plotting.style import MARKERS, PALETTE, new_figure, styled, use_log
+from verification.outcome import Check, Item, Outcome, Table
 
-from ..outcome import Check, Item, Outcome, Table
 from .common import SEED, count
 
 #: kernel -> the kernel, its degree of homogeneity, and a time at which one cluster in ten is left

@@ -11,8 +11,7 @@ import numpy as np
 
 import smolux as sx
 from smolux.plotting.style import MARKERS, PALETTE
-
-from ..outcome import Check
+from verification.outcome import Check
 
 TARGETS = Path(__file__).parent / "targets"
 SEED = 2003

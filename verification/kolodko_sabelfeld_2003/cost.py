@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from smolux.plotting.style import new_figure, styled, use_log
+from verification.outcome import Check, Item, Outcome, Table
 
-from ..outcome import Check, Item, Outcome, Table
 from .common import (
     KERNEL_NAME,
     LOOK,

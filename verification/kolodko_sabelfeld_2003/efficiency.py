@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from smolux.plotting.style import MARKERS, PALETTE, new_figure, styled, use_linear, use_log
+from verification.outcome import Check, Item, Outcome, Table, worst
 
-from ..outcome import Check, Item, Outcome, Table, worst
 from .common import (
     KERNEL_NAME,
     QUICK,

@@ -9,8 +9,8 @@ import numpy as np
 
 import smolux as sx
 from smolux.plotting.style import MARKERS, PALETTE, new_figure, styled, use_log
+from verification.outcome import Check, Item, Outcome, Table, mean_sigmas, worst
 
-from ..outcome import Check, Item, Outcome, Table, mean_sigmas, worst
 from .common import SEED, count, curves, within
 
 #: j*: the paper does not say which one its figures have

@@ -11,8 +11,8 @@ from scipy.special import gammaln
 import smolux as sx
 from smolux.ensembles.batches import make_sampler
 from smolux.plotting.style import MARKERS, PALETTE, new_figure, styled, use_linear, use_log
+from verification.outcome import Check, Item, Outcome, Table, normal_sigmas, worst
 
-from ..outcome import Check, Item, Outcome, Table, normal_sigmas, worst
 from .common import AR, SEED, count, model, target, within
 
 PARTICLES = (128, 256, 512, 1024)

@@ -1,6 +1,7 @@
 """Mistakes put into the code on purpose, one at a time, to see which tests fail."""
 
-from ..suite import Suite
+from verification.suite import Suite
+
 from .area import item, total
 from .mistakes import areas
 

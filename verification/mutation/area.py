@@ -16,9 +16,9 @@ from queue import SimpleQueue
 from typing import Any
 
 from smolux.runtime.resources import cores
+from verification.outcome import Check, Item, Outcome, Table
+from verification.suite import ROOT
 
-from ..outcome import Check, Item, Outcome, Table
-from ..suite import ROOT
 from .mistakes import Mistake, read
 from .records import Records
 from .trial import PATIENCE, BrokenTrialError, Copy

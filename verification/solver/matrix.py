@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 
 from smolux.plotting.style import PALETTE, new_figure, styled, use_log
 from smolux.runtime.resources import cores
+from verification.outcome import Check, Item, Outcome, Table, at_most
 
-from ..outcome import Check, Item, Outcome, Table, at_most
 from . import reference
 from .cells import DIRECT, Cell, alone, each, paired, timed
 from .closed import additive_number, constant_densities, constant_number, second_moment

@@ -14,10 +14,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
 
-from .. import units
-from ..errors import InputError
-from ..model import Model
-from ..settings.solution import OBSERVED
+from smolux import units
+from smolux.errors import InputError
+from smolux.model import Model
+from smolux.settings.solution import OBSERVED
+
 from .lines import Path, line_numbers
 from .physics import build, model_tables, read_physics
 from .reader import Problems, Table

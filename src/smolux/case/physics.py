@@ -7,16 +7,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from typing import Any
 
-from .. import units
-from ..errors import InputError, did_you_mean
-from ..initial import INITIALS, Empty, Initial, Sizes
-from ..kernels import KERNELS, Sum
-from ..kernels.base import Kernel
-from ..model import Model
-from ..model_dict import model_from_dict, model_to_dict
-from ..processes import PROCESSES
-from ..processes.base import Process
-from ..units import Dimension
+from smolux import units
+from smolux.errors import InputError, did_you_mean
+from smolux.initial import INITIALS, Empty, Initial, Sizes
+from smolux.kernels import KERNELS, Sum
+from smolux.kernels.base import Kernel
+from smolux.model import Model
+from smolux.model_dict import model_from_dict, model_to_dict
+from smolux.processes import PROCESSES
+from smolux.processes.base import Process
+from smolux.units import Dimension
+
 from .lines import Path
 from .reader import Problems, Table, dotted, show
 

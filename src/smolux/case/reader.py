@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from .. import units
-from ..errors import InputError, Problem, did_you_mean
+from smolux import units
+from smolux.errors import InputError, Problem, did_you_mean
+
 from .lines import Path, lookup
 
 

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from .. import units
-from ..errors import InputError, did_you_mean
-from ..runtime.executors import KINDS
-from ..settings import Control, Settings, SolverSettings
-from ..settings.kinds import Kind, Seconds, Times, declared
-from ..settings.solution import OBSERVED
-from ..weighting import WeightFunction
+from smolux import units
+from smolux.errors import InputError, did_you_mean
+from smolux.runtime.executors import KINDS
+from smolux.settings import Control, Settings, SolverSettings
+from smolux.settings.kinds import Kind, Seconds, Times, declared
+from smolux.settings.solution import OBSERVED
+from smolux.weighting import WeightFunction
+
 from .reader import Problems, Table, show
 
 #: the most output times a table of times may ask for

@@ -9,16 +9,17 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
-from ..settings import SpatialSettings
-from ..settings.kinds import declared, kinds
+from smolux.errors import InputError
+from smolux.settings import SpatialSettings
+from smolux.settings.kinds import declared, kinds
+
 from . import contents, read_text
 from .reader import Problems, Table, show
 from .settings import read_key, read_times
 from .write import to_toml
 
 if TYPE_CHECKING:
-    from ..spatial import System
+    from smolux.spatial import System
 
 #: figures of a run in space, by the names of `smolux.cli`
 FIGURES = (
@@ -61,7 +62,7 @@ class Flight:
         InputError
             If they do not fit.
         """
-        from .. import spatial
+        from smolux import spatial
 
         walls = self.walls * self.dimension if len(self.walls) == 1 else self.walls
         common: dict[str, Any] = {
@@ -78,7 +79,7 @@ class Flight:
 
     def arguments(self) -> dict[str, Any]:
         """Arguments of `smolux.spatial.simulate` beside the system."""
-        from ..spatial.methods import METHODS
+        from smolux.spatial.methods import METHODS
 
         given = {name: getattr(self, name) for name in _STEPPING}
         settings = {name: value for name, value in given.items() if value is not None}
@@ -155,7 +156,7 @@ def load(path: str | os.PathLike[str], sets: Sequence[str] = ()) -> SpatialCase 
 
 
 def _read_flight(content: Any, problems: Problems) -> Flight | None:
-    from ..spatial.methods import METHODS
+    from smolux.spatial.methods import METHODS
 
     table = Table(content, ("spatial",), problems)
     if "discs" not in table:
@@ -207,7 +208,7 @@ def _check_method(flight: Flight, table: Table) -> None:
 
 
 def _read_walls(table: Table) -> tuple[str, ...]:
-    from ..spatial.box import WALLS
+    from smolux.spatial.box import WALLS
 
     value = table.take("walls", list(Flight.walls))
     words = [value] if isinstance(value, str) else value

@@ -5,10 +5,10 @@ from __future__ import annotations
 import inspect
 from dataclasses import MISSING, fields
 
-from ..errors import InputError, did_you_mean
-from ..kernels import KERNELS
-from ..kernels.base import Kernel
-from ..units import of_arguments
+from smolux.errors import InputError, did_you_mean
+from smolux.kernels import KERNELS
+from smolux.kernels.base import Kernel
+from smolux.units import of_arguments
 
 
 def example(law: type[Kernel]) -> Kernel:

@@ -18,7 +18,8 @@ def check(
     sets: Sets = None,
 ) -> None:
     """Check a case: mistakes, gelation, extinction, time, memory and size of the output."""
-    from ..case import load, spatial
+    from smolux.case import load, spatial
+
     from . import checking, flying
 
     flight = spatial.load(case, sets or ())

@@ -6,15 +6,16 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from ..case import Case, Parallel, Run
-from ..case.physics import model_tables
-from ..case.settings import as_table
-from ..case.write import value
-from ..errors import InputError
-from ..runtime.executors import check_installed
-from ..runtime.resources import cores
-from ..settings import SolverSettings
-from ..stochastic.planning import make_plan
+from smolux.case import Case, Parallel, Run
+from smolux.case.physics import model_tables
+from smolux.case.settings import as_table
+from smolux.case.write import value
+from smolux.errors import InputError
+from smolux.runtime.executors import check_installed
+from smolux.runtime.resources import cores
+from smolux.settings import SolverSettings
+from smolux.stochastic.planning import make_plan
+
 from .console import amount, duration
 from .estimate import estimate, negative_rates, physics_warnings
 

@@ -25,7 +25,8 @@ def compare(
 
     Ends with 1 if a method differs.
     """
-    from ..case import load
+    from smolux.case import load
+
     from . import comparing
 
     if not comparing.run(load(case, sets or ()), method, figure):

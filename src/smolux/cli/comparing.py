@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 import smolux
+from smolux import analysis
+from smolux.case import Case
+from smolux.deterministic import SolverError
+from smolux.deterministic.solver import solve
+from smolux.errors import InputError, Interrupted, did_you_mean, quiet
+from smolux.methods import METHODS
+from smolux.results import warnings
+from smolux.settings.solution import OBSERVED
 
-from .. import analysis
-from ..case import Case
-from ..deterministic import SolverError
-from ..deterministic.solver import solve
-from ..errors import InputError, Interrupted, did_you_mean, quiet
-from ..methods import METHODS
-from ..results import warnings
-from ..settings.solution import OBSERVED
 from . import console
 from .progress import Display
 
@@ -197,7 +197,7 @@ def run(case: Case, methods: Sequence[str] | None, figure: Path | None) -> bool:
     assert seeded.run is not None
     chosen = choose(methods)
     if figure is not None:
-        from ..plotting.style import kind_of
+        from smolux.plotting.style import kind_of
 
         kind_of(figure)  # before all that would be lost
     console.say(f"seed {seeded.run.seed}")
@@ -214,7 +214,7 @@ def run(case: Case, methods: Sequence[str] | None, figure: Path | None) -> bool:
         "1 of 100 tables or fewer."
     )
     if figure is not None:
-        from .. import plotting
+        from smolux import plotting
 
         plotting.save(plotting.comparison({c.name: c.ds for c in found}), figure)
         print(f"{figure} written")

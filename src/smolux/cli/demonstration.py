@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from .. import analysis
-from ..analysis.table import aligned
-from ..case import Case, Output, Run
-from ..errors import InputError
-from ..kernels import Constant
-from ..model import Model
-from ..runtime.files import replacing
+from smolux import analysis
+from smolux.analysis.table import aligned
+from smolux.case import Case, Output, Run
+from smolux.errors import InputError
+from smolux.kernels import Constant
+from smolux.model import Model
+from smolux.runtime.files import replacing
+
 from . import rundir, running
 from .console import say
 

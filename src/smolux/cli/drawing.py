@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from .. import plotting
-from ..errors import InputError
+from smolux import plotting
+from smolux.errors import InputError
+
 from . import figures, flying, showing
 
 _DEFAULT = ("clusters", "moments", "size-distribution")

@@ -35,7 +35,8 @@ def efficiency(
     ] = None,
 ) -> None:
     """Measure bias, variance, cost and efficiency with the particles and replicas of a case."""
-    from ..case import load
+    from smolux.case import load
+
     from . import weighing
 
     weighing.run(load(case, sets or ()), method, weighting, observable, figure)

@@ -10,21 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 import smolux
-
-from ..case import Case
-from ..case.settings import Run
-from ..errors import Interrupted, quiet
-from ..functions.content import frozen
-from ..initial import Sizes
-from ..methods import METHODS, SizeClass
-from ..methods.base import Method
-from ..processes import Aggregation, Removal, Source
-from ..runtime.resources import available_memory, cores
-from ..runtime.room import amount
-from ..settings import Settings
-from ..settings.population import doubles_at
-from ..stochastic.choose_weighting import chosen_weighting
-from ..stochastic.windows import factors_of
+from smolux.case import Case
+from smolux.case.settings import Run
+from smolux.errors import Interrupted, quiet
+from smolux.functions.content import frozen
+from smolux.initial import Sizes
+from smolux.methods import METHODS, SizeClass
+from smolux.methods.base import Method
+from smolux.processes import Aggregation, Removal, Source
+from smolux.runtime.resources import available_memory, cores
+from smolux.runtime.room import amount
+from smolux.settings import Settings
+from smolux.settings.population import doubles_at
+from smolux.stochastic.choose_weighting import chosen_weighting
+from smolux.stochastic.windows import factors_of
 
 Float = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from .. import plotting
-from ..errors import InputError, did_you_mean
+from smolux import plotting
+from smolux.errors import InputError, did_you_mean
 
 #: name -> function of a result and of what it is compared with
 KINDS: dict[str, Callable[..., Any]] = {
@@ -43,7 +43,7 @@ def draw(name: str, ds: Any, solution: Any = None) -> Any:
         raise InputError(f"--kind {name}: no such figure{did_you_mean(name, list(KINDS))}")
     reference = solution
     if name in _KNOWING:
-        from ..analysis import exact_dataset
+        from smolux.analysis import exact_dataset
 
         reference = "exact" if solution is None or exact_dataset(ds) is not None else solution
     return KINDS[name](ds, reference=reference)

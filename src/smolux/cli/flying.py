@@ -10,12 +10,13 @@ from typing import Any
 
 import typer
 
-from .. import plotting, results, spatial
-from ..case import spatial as cases
-from ..case.spatial import FIGURES, SpatialCase
-from ..errors import InputError, Interrupted, did_you_mean, quiet
-from ..runtime.stopping import ALL, Stopper
-from ..spatial.simulation import checked
+from smolux import plotting, results, spatial
+from smolux.case import spatial as cases
+from smolux.case.spatial import FIGURES, SpatialCase
+from smolux.errors import InputError, Interrupted, did_you_mean, quiet
+from smolux.runtime.stopping import ALL, Stopper
+from smolux.spatial.simulation import checked
+
 from . import rundir
 from .console import amount, duration, say
 from .progress import Display

@@ -13,7 +13,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from ..errors import InputError, Interrupted
+from smolux.errors import InputError, Interrupted
 
 OURS, YOURS, RESUMABLE = 1, 2, 3
 #: as the shell has it for a program that Ctrl-C ended

@@ -18,7 +18,8 @@ def movie(
     pixels: Annotated[int, typer.Option("--pixels", "-p", help="Width; even.")] = 480,
 ) -> None:
     """Make a movie of a run in space: GIF, or MP4 with the extra "movie"."""
-    from .. import plotting
+    from smolux import plotting
+
     from . import showing
 
     file = output or showing.find(path).parent / "movie.gif"

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
-from ..runtime.progress import Progress
+from smolux.runtime.progress import Progress
+
 from .console import amount, duration, say
 
 

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import smolux
+from smolux import analysis
+from smolux.case import Case
+from smolux.results import warnings
+from smolux.runtime.files import replacing
 
-from .. import analysis
-from ..case import Case
-from ..results import warnings
-from ..runtime.files import replacing
 from . import showing
 from .console import amount, duration
 

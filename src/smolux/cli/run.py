@@ -23,9 +23,10 @@ def run(
     Ctrl-C, SIGTERM or the time limit stop it without loss; "smolux run FOLDER" goes on from there,
     and the data are bit for bit those of a run without a stop.
     """
-    from ..case import load, spatial
-    from ..errors import InputError
-    from ..results import warnings
+    from smolux.case import load, spatial
+    from smolux.errors import InputError
+    from smolux.results import warnings
+
     from . import flying, report, rundir, running, showing
     from .console import say
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..case import Case, load
-from ..case.spatial import SpatialCase
-from ..errors import InputError
-from ..runtime.files import replacing
+from smolux.case import Case, load
+from smolux.case.spatial import SpatialCase
+from smolux.errors import InputError
+from smolux.runtime.files import replacing
 
 
 @dataclass(frozen=True)

@@ -14,18 +14,18 @@ from pathlib import Path
 from typing import Any
 
 import smolux
+from smolux import results
+from smolux.case import Case, parse
+from smolux.deterministic import SolverError
+from smolux.deterministic.solver import solve
+from smolux.errors import InputError, Interrupted, OutOfMemoryError, WorkerError, quiet
+from smolux.model_dict import model_to_dict
+from smolux.observables import units
+from smolux.runtime.executors import opened
+from smolux.runtime.stopping import ALL, Stopper
+from smolux.settings import Settings
+from smolux.stochastic import checkpoint as checkpoints
 
-from .. import results
-from ..case import Case, parse
-from ..deterministic import SolverError
-from ..deterministic.solver import solve
-from ..errors import InputError, Interrupted, OutOfMemoryError, WorkerError, quiet
-from ..model_dict import model_to_dict
-from ..observables import units
-from ..runtime.executors import opened
-from ..runtime.stopping import ALL, Stopper
-from ..settings import Settings
-from ..stochastic import checkpoint as checkpoints
 from . import figures, report
 from .console import duration, say
 from .progress import Display

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .. import analysis, results
-from ..errors import InputError
-from ..results import warnings
+from smolux import analysis, results
+from smolux.errors import InputError
+from smolux.results import warnings
 
 
 def find(path: Path) -> Path:

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import smolux
+from smolux.errors import InputError, Interrupted, quiet
+from smolux.runtime.stopping import ALL, Stopper
+from smolux.sweeps import go_on
+from smolux.sweeps.grid import failures
 
-from ..errors import InputError, Interrupted, quiet
-from ..runtime.stopping import ALL, Stopper
-from ..sweeps import go_on
-from ..sweeps.grid import failures
 from . import showing
 from .console import say
 from .progress import Display

@@ -6,7 +6,7 @@ import os
 from importlib import resources
 from pathlib import Path
 
-from ..errors import InputError, did_you_mean
+from smolux.errors import InputError, did_you_mean
 
 #: in the order of the list, from simple to special
 TEMPLATES = (

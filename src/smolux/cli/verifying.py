@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .. import conformance
-from ..conformance import Finding
-from ..errors import InputError, did_you_mean
-from ..methods import METHODS
+from smolux import conformance
+from smolux.conformance import Finding
+from smolux.errors import InputError, did_you_mean
+from smolux.methods import METHODS
+
 from .console import duration, say
 
 

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .. import ensembles
-from ..case import Case
-from ..errors import InputError, Interrupted, did_you_mean
-from ..weighting import WEIGHTINGS, WeightFunction
-from ..weighting.base import Weighting
+from smolux import ensembles
+from smolux.case import Case
+from smolux.errors import InputError, Interrupted, did_you_mean
+from smolux.weighting import WEIGHTINGS, WeightFunction
+from smolux.weighting.base import Weighting
+
 from . import console
 from .progress import Display
 
@@ -67,7 +68,7 @@ def run(
     assert settings is not None
     chosen = weightings_of(weightings or ("number", "mass-flow"))
     if figure is not None:
-        from ..plotting.style import kind_of
+        from smolux.plotting.style import kind_of
 
         kind_of(figure)  # before all that would be lost
     console.say(
@@ -95,7 +96,7 @@ def run(
         raise
     _print(ds)
     if figure is not None:
-        from .. import plotting
+        from smolux import plotting
 
         plotting.save(plotting.efficiency(ds), figure)
         print(f"{figure} written")

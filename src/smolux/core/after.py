@@ -11,7 +11,8 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from ..jit.compile import piece
+from smolux.jit.compile import piece
+
 from .state import COUNTED, DOUBLE_AT, DOUBLINGS, EXTENSIVE, EXTINCT, GROW, PARTICLES, TIME
 
 

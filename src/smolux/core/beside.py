@@ -22,7 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from ..jit.compile import cold_piece, piece
+from smolux.jit.compile import cold_piece, piece
+
 from . import rng
 from .bounds import thinned
 from .fire import Books, Kinds

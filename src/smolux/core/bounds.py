@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..jit.compile import cold_piece, piece
+from smolux.jit.compile import cold_piece, piece
+
 from .state import (
     BAD_FACTOR,
     CULPRIT,

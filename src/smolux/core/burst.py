@@ -13,7 +13,8 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from ..jit.compile import piece
+from smolux.jit.compile import piece
+
 from . import rng
 from .state import (
     BAD_RATE,

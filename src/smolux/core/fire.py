@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..jit.compile import piece
+from smolux.jit.compile import piece
+
 from . import rng
 from .bounds import ROUNDING, note_bad, thinned
 from .state import (

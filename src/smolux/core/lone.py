@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..jit.compile import cold_piece, piece, user_piece
+from smolux.jit.compile import cold_piece, piece, user_piece
+
 from . import rng
 from .loop import PATIENCE
 from .slots import slot_of

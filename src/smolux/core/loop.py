@@ -18,7 +18,8 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ..jit.compile import cold_piece, entry, piece
+from smolux.jit.compile import cold_piece, entry, piece
+
 from .after import make_after_event
 from .burst import Burst
 from .record import make_record

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
-from ..jit.compile import cold_piece, piece
+from smolux.jit.compile import cold_piece, piece
+
 from .slots import octave
 from .state import AT, HIGHEST, PER_PROCESS, SCALARS
 

@@ -12,7 +12,8 @@ import math
 
 import numpy as np
 
-from ..jit.compile import cold_piece, piece
+from smolux.jit.compile import cold_piece, piece
+
 from .seeds import spawned
 
 _R17, _R23, _R45 = np.uint64(17), np.uint64(23), np.uint64(45)

@@ -13,7 +13,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from ..jit.compile import piece
+from smolux.jit.compile import piece
 
 
 @intrinsic

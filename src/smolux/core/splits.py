@@ -18,7 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..jit.compile import cold_piece, piece, user_piece
+from smolux.jit.compile import cold_piece, piece, user_piece
+
 from . import rng
 from .bounds import ROUNDING, note_bad
 from .slots import octave, slot_of, slot_top

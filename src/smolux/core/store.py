@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..jit.compile import cold_piece, piece
+from smolux.jit.compile import cold_piece, piece
+
 from .burst import Burst
 from .loop import Pieces
 from .state import BOTH, FIRST, ONE, PARTICLES, SECOND

@@ -8,7 +8,8 @@ the largest rate of its own slot: if rates differ little, at once.
 
 from __future__ import annotations
 
-from ..jit.compile import piece
+from smolux.jit.compile import piece
+
 from . import rng
 from .slots import slot_of, slot_top
 from .state import LONE_BITS

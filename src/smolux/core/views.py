@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..jit.compile import piece
+from smolux.jit.compile import piece
+
 from .state import State, Tally
 
 

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ..jit.compile import cold_piece, piece, user_piece
+from smolux.jit.compile import cold_piece, piece, user_piece
+
 from . import rng
 from .record import find_bin, power
 

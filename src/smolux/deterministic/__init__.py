@@ -1,6 +1,7 @@
 """The same model by rate equations: `solve`, steady states and their stability."""
 
-from ..runtime.progress import Progress
+from smolux.runtime.progress import Progress
+
 from .hopf import HopfThreshold, hopf_threshold
 from .integrate import SolverError
 from .solver import solve

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
-from ..errors import InputError
+from smolux.errors import InputError
 
 
 def renamed(new: str, value: Any, old: str, former: Any) -> Any:

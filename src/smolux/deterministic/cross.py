@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ..kernels.base import Kernel
+from smolux.kernels.base import Kernel
+
 from .trial import FLOOR, Sample, values
 
 Float = NDArray[np.float64]

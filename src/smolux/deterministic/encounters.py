@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..functions.time import TimeFunction
-from ..kernels.base import Kernel
-from ..kernels.shared import Shared
-from ..model import Model
-from ..processes.base import PairProcess
-from ..processes.daughters import Merged
+from smolux.functions.time import TimeFunction
+from smolux.kernels.base import Kernel
+from smolux.kernels.shared import Shared
+from smolux.model import Model
+from smolux.processes.base import PairProcess
+from smolux.processes.daughters import Merged
+
 from .lattice import on_multiples
 from .meeting import Meeting
 from .operator import Direct, Operator, OperatorFactory

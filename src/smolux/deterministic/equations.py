@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..functions.time import TimeFunction
-from ..model import Model
-from ..processes.base import PairProcess, Process
+from smolux.functions.time import TimeFunction
+from smolux.model import Model
+from smolux.processes.base import PairProcess, Process
+
 from .encounters import Encounters, merges
 from .gel import gel_affinity
 from .terms import SUMS, Flow, Leaving, term_of

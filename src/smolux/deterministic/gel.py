@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..kernels.base import Kernel
+from smolux.errors import InputError
+from smolux.kernels.base import Kernel
 
 Float = NDArray[np.float64]
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..initial import monodisperse
-from ..kernels.base import Kernel
-from ..model import Model
-from ..processes import Aggregation, Shattering
+from smolux.errors import InputError
+from smolux.initial import monodisperse
+from smolux.kernels.base import Kernel
+from smolux.model import Model
+from smolux.processes import Aggregation, Shattering
+
 from .integrate import SolverError
 from .steady import SteadyState, eigenvalues, linearisation, steady_state
 

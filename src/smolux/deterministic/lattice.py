@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..kernels.base import Kernel
+from smolux.kernels.base import Kernel
 
 Float = NDArray[np.float64]
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.linalg import lapack
 from scipy.sparse import linalg as krylov
 
-from ..processes import Evaporation
+from smolux.processes import Evaporation
+
 from .equations import Equations
 from .terms import Totals
 

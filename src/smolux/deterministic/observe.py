@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..processes.base import PairProcess, Process
-from ..results.records import Records
+from smolux.processes.base import PairProcess, Process
+from smolux.results.records import Records
+
 from .terms import Totals
 
 Float = NDArray[np.float64]

@@ -8,8 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..kernels.base import Kernel
+from smolux.errors import InputError
+from smolux.kernels.base import Kernel
+
 from .cross import Factors, cross_approximation, given_factors, interpolation
 from .low_rank import LowRank
 from .trial import Sample, values

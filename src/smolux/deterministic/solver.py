@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, Interrupted
-from ..functions.content import frozen
-from ..model import Model
-from ..processes import Source
-from ..results import to_dataset, told
-from ..runtime.progress import Progress
-from ..settings import SolverSettings
+from smolux.errors import InputError, Interrupted
+from smolux.functions.content import frozen
+from smolux.model import Model
+from smolux.processes import Source
+from smolux.results import to_dataset, told
+from smolux.runtime.progress import Progress
+from smolux.settings import SolverSettings
+
 from .arguments import renamed
 from .encounters import Encounters
 from .equations import Equations
@@ -30,7 +31,7 @@ from .window import Window, usual_limit
 if TYPE_CHECKING:
     import xarray as xr
 
-    from ..results.records import Records
+    from smolux.results.records import Records
 
 Float = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..functions.content import frozen
-from ..functions.user_function import golden
-from ..kernels import Constant
-from ..kernels.base import Kernel
+from smolux.errors import InputError
+from smolux.functions.content import frozen
+from smolux.functions.user_function import golden
+from smolux.kernels import Constant
+from smolux.kernels.base import Kernel
 
 Float = NDArray[np.float64]
 

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import linalg as krylov
 
-from ..errors import InputError
-from ..functions.content import frozen
-from ..model import Model
-from ..runtime.progress import Progress
+from smolux.errors import InputError
+from smolux.functions.content import frozen
+from smolux.model import Model
+from smolux.runtime.progress import Progress
+
 from .arguments import renamed
 from .encounters import Encounters
 from .equations import Equations

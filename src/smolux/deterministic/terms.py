@@ -13,10 +13,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Model
-from ..processes.base import LoneProcess, Process
-from ..processes.daughters import Debris, Detached, Merged, Nothing, Split
-from ..processes.source import Source
+from smolux.model import Model
+from smolux.processes.base import LoneProcess, Process
+from smolux.processes.daughters import Debris, Detached, Merged, Nothing, Split
+from smolux.processes.source import Source
+
 from .meeting import Meeting
 from .splitting import Splits
 

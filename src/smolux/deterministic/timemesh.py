@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
-from ..functions.intervals import Interval
-from ..functions.time import TimeFunction
-from ..functions.user_function import spread
+from smolux.errors import InputError
+from smolux.functions.intervals import Interval
+from smolux.functions.time import TimeFunction
+from smolux.functions.user_function import spread
 
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
-from ..functions.intervals import Interval
-from ..kernels.base import Kernel
-from ..kernels.check import verdict
+from smolux.errors import InputError
+from smolux.functions.intervals import Interval
+from smolux.kernels.base import Kernel
+from smolux.kernels.check import verdict
 
 if TYPE_CHECKING:
     from .cross import Factors

@@ -25,11 +25,11 @@ from smolux.model import Model
 from smolux.runtime.progress import Progress
 from smolux.settings import Settings
 from smolux.settings.target_error import FEWEST, Goal, named
-from smolux.stochastic.simulation.observe import observable
-from smolux.stochastic.simulation.plan import Plan
-from smolux.stochastic.simulation.planning import decided
-from smolux.stochastic.simulation.replicas import Group, empty_state, initial_populations
-from smolux.stochastic.simulation.totals import Totals, attempts_of
+from smolux.stochastic.observe import observable
+from smolux.stochastic.plan import Plan
+from smolux.stochastic.planning import decided
+from smolux.stochastic.replicas import Group, empty_state, initial_populations
+from smolux.stochastic.totals import Totals, attempts_of
 from smolux.weighting.base import Weighting
 
 from .moments import Moments

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import numbers
-from ..errors import InputError
+from smolux.checks import numbers
+from smolux.errors import InputError
 
 Float = NDArray[np.float64]
 

@@ -9,7 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..errors import InputError
+from smolux.errors import InputError
+
 from .base import Float, Solution
 
 #: the coefficients cost O(k**2): under a second for 20,000 sizes, a minute for the most

@@ -15,8 +15,8 @@ from .shattering import ConstantShattering
 from .steady import MultiplicativeShattering
 
 if TYPE_CHECKING:
-    from ..kernels.base import Kernel
-    from ..model import Model
+    from smolux.kernels.base import Kernel
+    from smolux.model import Model
 
 #: pairs of sizes at which a kernel must follow the law it claims
 _SIZES = np.array([1.0, 2.0, 3.0, 7.0, 50.0, 1000.0, 1e6])

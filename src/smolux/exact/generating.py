@@ -22,7 +22,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from smolux.errors import InputError
 
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]

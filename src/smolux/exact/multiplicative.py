@@ -8,7 +8,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ..errors import did_you_mean
+from smolux.errors import did_you_mean
+
 from .base import Float, Solution
 from .special import log_borel
 

@@ -9,7 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..errors import InputError
+from smolux.errors import InputError
+
 from .base import Float, Solution
 from .constant import Constant
 from .generating import generating_function

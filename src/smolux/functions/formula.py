@@ -21,7 +21,8 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, did_you_mean
+from smolux.errors import InputError, did_you_mean
+
 from .intervals import Interval
 
 #: function -> (its NumPy name, number of arguments; None: two or more)

@@ -16,8 +16,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import is_number, numbers
-from ..errors import InputError
+from smolux.checks import is_number, numbers
+from smolux.errors import InputError
+
 from .content import frozen
 from .formula import Formula, parse
 from .intervals import Interval, range_of

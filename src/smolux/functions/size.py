@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
+from smolux.errors import InputError
+
 from .law import Law
 
 Float = NDArray[np.float64]
@@ -28,9 +29,9 @@ class SizeFunction(Law):
         Parameters
         ----------
         given : float, str, callable, sequence of float or SizeFunction
-            A number; a formula in the size such as ``"k**(2/3)"``, see `smolux.functions.formula`; a plain
-            Python function of one size, whose further arguments have defaults; or the values for
-            the sizes 1, 2, ..., of which the last one holds for all larger ones, too.
+            A number; a formula in the size such as ``"k**(2/3)"``, see `smolux.functions.formula`;
+            a plain Python function of one size, whose further arguments have defaults; or the
+            values for the sizes 1, 2, ..., of which the last one holds for all larger ones, too.
         what : str
             What it stands for, for messages.
         variable : str

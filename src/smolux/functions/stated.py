@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import is_number, numbers
-from ..errors import InputError
+from smolux.checks import is_number, numbers
+from smolux.errors import InputError
 
 #: what a user may state: the lowest and the highest value, or a function of the edges of a box
 StatedBounds = tuple[float, float] | Callable[..., Any]

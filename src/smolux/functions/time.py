@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
+from smolux.errors import InputError
+
 from .bounds import subdivided
 from .intervals import Interval
 from .law import Law
@@ -18,7 +19,7 @@ from .user_function import numbers_of, spread
 
 Float = NDArray[np.float64]
 
-#: how closely a function that intervals do not follow is tried, see `smolux.functions.user_function.spread`
+#: how closely a function that intervals do not follow is tried, see `.user_function.spread`
 _SAMPLES = 128
 _MARGIN = 0.1
 #: a lower bound that is negative by no more than this share of the upper one is rounding
@@ -40,8 +41,8 @@ class TimeFunction(Law):
         ----------
         value : float, callable, str, Stated or TimeFunction
             A number; a plain Python function ``f(t)``, whose further arguments have defaults; or a
-            formula in ``t`` such as ``"0.01 * (1 - t/400)"``, see `smolux.functions.formula`; or a function
-            with what is known of it, see `smolux.law`.
+            formula in ``t`` such as ``"0.01 * (1 - t/400)"``, see `smolux.functions.formula`;
+            or a function with what is known of it, see `smolux.law`.
         what : str
             What it stands for, for messages.
 

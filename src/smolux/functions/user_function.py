@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..checks import is_number
-from ..errors import InputError, did_you_mean
+from smolux.checks import is_number
+from smolux.errors import InputError, did_you_mean
+
 from .content import INSTALLED, frozen, module_of, names_in
 from .intervals import Interval
 

@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import is_number
-from ..errors import InputError, Problem
+from smolux.checks import is_number
+from smolux.errors import InputError, Problem
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

@@ -8,7 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..errors import Problem
+from smolux.errors import Problem
+
 from .base import Float, Initial, Int, as_number, check_positive, is_above, refuse
 
 #: change of M1 by rounding to whole sizes, relative, above which a result warns of it

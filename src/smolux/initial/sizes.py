@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import InputError, Problem
+from smolux.errors import InputError, Problem
+
 from .base import LARGEST, Float, Initial, Int, as_number, is_above
 
 

@@ -29,8 +29,9 @@ from typing import Any
 import numba
 import numpy as np
 
-from ..functions.content import INSTALLED, OPTIONS, digest, is_frozen, module_of
-from ..runtime.files import keep, kept
+from smolux.functions.content import INSTALLED, OPTIONS, digest, is_frozen, module_of
+from smolux.runtime.files import keep, kept
+
 from . import pipeline
 
 try:

@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from smolux.checks import is_number
 from smolux.errors import InputError, Problem
 from smolux.functions.intervals import Interval
 from smolux.functions.stated import Stated
 from smolux.functions.time import TimeFunction
 
-from ..checks import is_number
 from .majorant import Majorant
 
 Float = NDArray[np.float64]

@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.loop import Pieces
-from ..core.state import State
-from ..kernels.majorant import Majorant
+from smolux.core.loop import Pieces
+from smolux.core.state import State
+from smolux.kernels.majorant import Majorant
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

@@ -10,8 +10,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Model
-from ..processes.base import PairProcess
+from smolux.model import Model
+from smolux.processes.base import PairProcess
+
 from .acceptance_rejection.method import AcceptanceRejection
 from .base import Method, Rates
 from .low_rank.method import LowRank

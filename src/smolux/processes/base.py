@@ -10,12 +10,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import is_number
-from ..errors import about
-from ..functions.size import SizeFunction
-from ..functions.time import TimeFunction
-from ..kernels.base import Kernel
-from ..kernels.shared import share_law
+from smolux.checks import is_number
+from smolux.errors import about
+from smolux.functions.size import SizeFunction
+from smolux.functions.time import TimeFunction
+from smolux.kernels.base import Kernel
+from smolux.kernels.shared import share_law
+
 from .daughters import Daughters
 
 Float = NDArray[np.float64]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.base import Kernel
+from smolux.kernels.base import Kernel
 
 Float = NDArray[np.float64]
 

@@ -9,10 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..checks import is_number
-from ..errors import InputError, Problem, about
-from ..functions.size import SizeFunction
-from ..functions.time import TimeFunction
+from smolux.checks import is_number
+from smolux.errors import InputError, Problem, about
+from smolux.functions.size import SizeFunction
+from smolux.functions.time import TimeFunction
+
 from .base import Float, PairProcess
 from .daughters import Debris
 

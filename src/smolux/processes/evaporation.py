@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..checks import is_number
-from ..errors import InputError
+from smolux.checks import is_number
+from smolux.errors import InputError
+
 from .base import Float, LoneProcess, RatedBySize
 from .daughters import Detached
 

@@ -9,11 +9,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import about
-from ..functions.user_function import spread
-from ..kernels.base import Kernel
-from ..kernels.numeric import SAFETY
-from ..kernels.shared import pair_law
+from smolux.errors import about
+from smolux.functions.user_function import spread
+from smolux.kernels.base import Kernel
+from smolux.kernels.numeric import SAFETY
+from smolux.kernels.shared import pair_law
+
 from .base import Float, LoneProcess, Varying
 from .daughters import Split
 

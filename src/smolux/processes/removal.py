@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ..checks import is_number
-from ..errors import InputError, Problem
+from smolux.checks import is_number
+from smolux.errors import InputError, Problem
+
 from .base import Float, LoneProcess, RatedBySize
 from .daughters import Nothing
 

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ..errors import about
-from ..functions.time import TimeFunction
+from smolux.errors import about
+from smolux.functions.time import TimeFunction
+
 from .base import PairProcess
 from .daughters import Debris
 

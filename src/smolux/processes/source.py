@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import is_number
-from ..errors import InputError, Problem
+from smolux.checks import is_number
+from smolux.errors import InputError, Problem
+
 from .base import Float, Process, Varying
 
 

@@ -21,7 +21,8 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
-from ..errors import InputError, WorkerError
+from smolux.errors import InputError, WorkerError
+
 from .resources import cores
 
 KINDS = ("threads", "processes", "dask", "mpi")

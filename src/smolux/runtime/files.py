@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import InputError
+from smolux.errors import InputError
 
 #: a temporary file this old is not being written: its process was killed
 _STALE_SECONDS = 6 * 3600.0

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from threading import Lock
 from typing import Any
 
-from ..errors import OutOfMemoryError
+from smolux.errors import OutOfMemoryError
+
 from . import resources
 
 #: bytes that are left for all else: to write a checkpoint, to make the result

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
-from ..errors import InputError, Problem
-from ..model import Model
+from smolux.errors import InputError, Problem
+from smolux.model import Model
+
 from .kinds import checked
 
 

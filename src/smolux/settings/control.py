@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, Problem
+from smolux.errors import InputError, Problem
+
 from .arguments import Arguments
 from .kinds import Called, File, Kind, Seconds, setting
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import is_number, numbers, orders_of_moments, whole
-from ..errors import InputError, Problem, did_you_mean
+from smolux.checks import is_number, numbers, orders_of_moments, whole
+from smolux.errors import InputError, Problem, did_you_mean
 
 #: larger limits are named when they are what is wrong
 _SHOWN = 1_000_000

@@ -6,15 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..errors import Problem
+from smolux.errors import Problem
+
 from .arguments import Arguments
 from .kinds import Choice, Flag, Number, Orders, Registered, Text, Times, Whole, setting
 from .population import POPULATIONS
 from .target_error import FEWEST, Goal, named
 
 if TYPE_CHECKING:
-    from ..methods.base import Method
-    from ..weighting.base import Weighting
+    from smolux.methods.base import Method
+    from smolux.weighting.base import Weighting
 
 #: the replicas from this number on are pilots, see `smolux.settings.target_error`
 PILOT = 2**31

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..errors import Problem
-from ..model import Model
+from smolux.errors import Problem
+from smolux.model import Model
+
 from .arguments import Arguments
 from .kinds import Choice, Flag, Number, Orders, Times, Whole, setting
 from .simulation import MOST_SIZES

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..confidence import Sample, enlarged, half_width
-from ..errors import Problem, did_you_mean
+from smolux.confidence import Sample, enlarged, half_width
+from smolux.errors import Problem, did_you_mean
 
 Float = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, did_you_mean
+from smolux.errors import InputError, did_you_mean
 
 Float = NDArray[np.float64]
 

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.rng import streams
-from ..errors import InputError, did_you_mean
+from smolux.core.rng import streams
+from smolux.errors import InputError, did_you_mean
+
 from .analysis.overlaps import placed_at_random
 from .box import Box
 from .system import System

@@ -10,9 +10,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
-from ..results import told
-from ..runtime.progress import Progress
+from smolux.errors import InputError
+from smolux.results import told
+from smolux.runtime.progress import Progress
+
 from .methods.windowed import Windowed
 from .results.result import system_of, trace_of
 from .simulation import checked, driven

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import Interrupted, OutOfMemoryError, did_you_mean
-from ..runtime.progress import Progress
-from ..runtime.room import needed
-from ..runtime.stopping import AtOnce, Stopper
-from ..settings import SpatialSettings
+from smolux.errors import Interrupted, OutOfMemoryError, did_you_mean
+from smolux.runtime.progress import Progress
+from smolux.runtime.room import needed
+from smolux.runtime.stopping import AtOnce, Stopper
+from smolux.settings import SpatialSettings
+
 from .methods import METHODS
 from .methods.base import Run, SpatialMethod
 from .results.replay import narrate
@@ -103,7 +104,7 @@ def simulate(
     99
     """
     given = dict(locals())
-    from ..results import told
+    from smolux.results import told
 
     chosen, settings = checked(given.pop("system"), given.pop("method"), given)
     begun = partial(chosen.start, system, np.array(settings.times or ()))

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
+from smolux.errors import InputError
+
 from .analysis.overlaps import overlapping
 from .box import Box
 

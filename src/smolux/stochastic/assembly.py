@@ -6,16 +6,16 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
-from ..core import beside, rng
-from ..core.burst import make_burst
-from ..core.fire import make_encounters, make_fire
-from ..core.lone import Lone, bind_outcomes, bind_rates, make_ledger, make_lone
-from ..core.loop import make_advance, make_loop, make_next_event
-from ..core.record import tally_one
-from ..core.slots import slot_edges
-from ..core.splits import fill, new_splits, slots_beside
-from ..core.state import BOTH, LONE_BITS, Parameters
-from ..core.weights import (
+from smolux.core import beside, rng
+from smolux.core.burst import make_burst
+from smolux.core.fire import make_encounters, make_fire
+from smolux.core.lone import Lone, bind_outcomes, bind_rates, make_ledger, make_lone
+from smolux.core.loop import make_advance, make_loop, make_next_event
+from smolux.core.record import tally_one
+from smolux.core.slots import slot_edges
+from smolux.core.splits import fill, new_splits, slots_beside
+from smolux.core.state import BOTH, LONE_BITS, Parameters
+from smolux.core.weights import (
     make_outcome,
     make_rate,
     make_replacement,
@@ -23,16 +23,17 @@ from ..core.weights import (
     make_tally,
     make_weight,
 )
-from ..functions.content import digest, frozen, is_frozen
-from ..jit.compile import piece, user_piece, why_not
-from ..kernels.base import Kernel
-from ..kernels.constant import Constant
-from ..methods.base import Method, Rates
-from ..model import Model
-from ..processes import Aggregation, Source
-from ..processes.base import LoneProcess, PairProcess, Process
-from ..weighting import Number
-from ..weighting.base import Weighting
+from smolux.functions.content import digest, frozen, is_frozen
+from smolux.jit.compile import piece, user_piece, why_not
+from smolux.kernels.base import Kernel
+from smolux.kernels.constant import Constant
+from smolux.methods.base import Method, Rates
+from smolux.model import Model
+from smolux.processes import Aggregation, Source
+from smolux.processes.base import LoneProcess, PairProcess, Process
+from smolux.weighting import Number
+from smolux.weighting.base import Weighting
+
 from .remembered import bounds_of, timed
 from .tables import evaluated, latest
 

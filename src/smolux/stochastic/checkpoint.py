@@ -11,14 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from ..core.state import State, Tally, Windows
-from ..errors import InputError
-from ..functions.content import frozen
-from ..model import Model
-from ..model_dict import model_from_dict, model_to_dict
-from ..observables import layout
-from ..runtime.files import replacing
-from ..settings import Settings, from_plain, plain
+from smolux.core.state import State, Tally, Windows
+from smolux.errors import InputError
+from smolux.functions.content import frozen
+from smolux.model import Model
+from smolux.model_dict import model_from_dict, model_to_dict
+from smolux.observables import layout
+from smolux.runtime.files import replacing
+from smolux.settings import Settings, from_plain, plain
+
 from .plan import Plan
 from .replicas import Group
 from .subvolumes import Divided, within

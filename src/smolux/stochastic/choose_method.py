@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from ..methods import AcceptanceRejection, Method, SizeClass
-from ..methods.choose import Circumstances, choose, costs, unforeseen
-from ..processes.base import PairProcess
+from smolux.methods import AcceptanceRejection, Method, SizeClass
+from smolux.methods.choose import Circumstances, choose, costs, unforeseen
+from smolux.processes.base import PairProcess
+
 from .plan import Plan
 
 #: the replicas of a group depend on how many workers there are, the choice must not

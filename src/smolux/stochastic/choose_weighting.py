@@ -15,14 +15,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.state import EVENTS, TRIALS
-from ..methods import SizeClass
-from ..model import Model
-from ..observables import recorded
-from ..settings import Settings
-from ..settings.target_error import Goal
-from ..weighting import MassFlow, Number, WeightFunction
-from ..weighting.base import Weighting
+from smolux.core.state import EVENTS, TRIALS
+from smolux.methods import SizeClass
+from smolux.model import Model
+from smolux.observables import recorded
+from smolux.settings import Settings
+from smolux.settings.target_error import Goal
+from smolux.weighting import MassFlow, Number, WeightFunction
+from smolux.weighting.base import Weighting
+
 from .choose_method import event_cost
 from .observe import observable
 from .plan import Plan

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError, Interrupted, OutOfMemoryError, WorkerError
-from ..results import to_dataset
-from ..runtime.executors import completed
-from ..runtime.progress import Progress
-from ..settings import PILOT, Control
-from ..settings.target_error import Trial, Verdict, judge, plan_replicas, shortfall
+from smolux.errors import InputError, Interrupted, OutOfMemoryError, WorkerError
+from smolux.results import to_dataset
+from smolux.runtime.executors import completed
+from smolux.runtime.progress import Progress
+from smolux.settings import PILOT, Control
+from smolux.settings.target_error import Trial, Verdict, judge, plan_replicas, shortfall
+
 from . import checkpoint as checkpoints
 from .observe import observable, to_records
 from .plan import Plan, check_memory

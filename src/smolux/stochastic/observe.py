@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import observables
-from ..core.state import AT, DOUBLINGS, HIGHEST
-from ..results.records import Records
-from ..settings.target_error import Goal
+from smolux import observables
+from smolux.core.state import AT, DOUBLINGS, HIGHEST
+from smolux.results.records import Records
+from smolux.settings.target_error import Goal
+
 from .plan import Plan
 from .replicas import Group
 from .subvolumes import Divided

@@ -9,18 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from ..core.state import Grid, Windows
-from ..errors import InputError
-from ..functions.content import frozen
-from ..initial import Initial
-from ..methods.base import Method, Rates
-from ..model import Model
-from ..observables import observed
-from ..runtime.resources import available_memory
-from ..settings import PILOT, Settings
-from ..settings.population import doubles_at
-from ..settings.target_error import Goal
-from ..weighting.base import Weighting
+from smolux.core.state import Grid, Windows
+from smolux.errors import InputError
+from smolux.functions.content import frozen
+from smolux.initial import Initial
+from smolux.methods.base import Method, Rates
+from smolux.model import Model
+from smolux.observables import observed
+from smolux.runtime.resources import available_memory
+from smolux.settings import PILOT, Settings
+from smolux.settings.population import doubles_at
+from smolux.settings.target_error import Goal
+from smolux.weighting.base import Weighting
+
 from .assembly import loop_for, rates_for
 from .windows import inflow, windows_for
 

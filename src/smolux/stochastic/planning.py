@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..functions.content import frozen
-from ..methods import SizeClass
-from ..model import Model
-from ..settings import Settings
-from ..settings.simulation import METHOD, WEIGHTING
+from smolux.functions.content import frozen
+from smolux.methods import SizeClass
+from smolux.model import Model
+from smolux.settings import Settings
+from smolux.settings.simulation import METHOD, WEIGHTING
+
 from .choose_method import chosen_method
 from .choose_weighting import chosen_weighting
 from .plan import Plan, check_memory

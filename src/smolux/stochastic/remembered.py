@@ -5,8 +5,8 @@ every later run. What is remembered is known by its content: the law with all th
 parameters, the weighting, the boxes, the code that finds bounds, and what decides the last bit of
 a number on this machine. So bounds are the same bit for bit wherever they come from.
 
-A file holds one answer behind its checksum, see `smolux.runtime.files.keep`; a damaged one is found anew,
-and a folder that cannot be written to costs time, not the run.
+A file holds one answer behind its checksum, see `smolux.runtime.files.keep`; a damaged one is found
+anew, and a folder that cannot be written to costs time, not the run.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..functions.content import digest
-from ..jit.compile import cache_directory
-from ..kernels.base import Kernel
-from ..runtime.files import keep, kept
-from ..weighting.base import Weighting
+from smolux.functions.content import digest
+from smolux.jit.compile import cache_directory
+from smolux.kernels.base import Kernel
+from smolux.runtime.files import keep, kept
+from smolux.weighting.base import Weighting
 
 Float = NDArray[np.float64]
 Given = ParamSpec("Given")

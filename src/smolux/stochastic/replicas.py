@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.rng import streams
-from ..core.state import (
+from smolux.core.rng import streams
+from smolux.core.state import (
     BAD_FACTOR,
     BAD_RATE,
     BAD_SHARE,
@@ -48,15 +48,16 @@ from ..core.state import (
     new_state,
     new_tally,
 )
-from ..errors import InputError
-from ..initial import Sizes
-from ..jit.compile import CompileError
-from ..kernels.base import Kernel
-from ..kernels.shared import WHOLE, Shared
-from ..methods.base import size_of
-from ..model import Model
-from ..processes.base import LoneProcess, PairProcess
-from ..runtime import room
+from smolux.errors import InputError
+from smolux.initial import Sizes
+from smolux.jit.compile import CompileError
+from smolux.kernels.base import Kernel
+from smolux.kernels.shared import WHOLE, Shared
+from smolux.methods.base import size_of
+from smolux.model import Model
+from smolux.processes.base import LoneProcess, PairProcess
+from smolux.runtime import room
+
 from .assembly import bound_splits, factor_parameters, uncompilable
 from .plan import Plan
 from .remembered import spent
@@ -334,7 +335,7 @@ def _bad_share(name: str, share: Kernel, state: State, r: int) -> str:
 
 def _bad_rate(model: Model, state: State, r: int) -> str:
     i, j = int(state.count[r, WORST_I]), int(state.count[r, WORST_J])
-    if i == j == 0:  # of all particles together, see `smolux.methods.inverse.method.pieces`
+    if i == j == 0:  # of all particles together, see `smolux.methods.inverse.pieces`
         return (
             f"the rates of the kernel {model.kernel.label} of all pairs have no finite sum at "
             f"t = {state.clock[r, TIME]:.6g}: take a longer unit of time, in which rates are "

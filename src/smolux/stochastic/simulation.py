@@ -11,15 +11,16 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from ..functions.content import frozen
-from ..methods.base import Method
-from ..model import Model
-from ..results import told
-from ..runtime.executors import adapted, workers_of
-from ..runtime.progress import Progress
-from ..runtime.resources import cores
-from ..settings import Control, Settings
-from ..weighting.base import Weighting
+from smolux.functions.content import frozen
+from smolux.methods.base import Method
+from smolux.model import Model
+from smolux.results import told
+from smolux.runtime.executors import adapted, workers_of
+from smolux.runtime.progress import Progress
+from smolux.runtime.resources import cores
+from smolux.settings import Control, Settings
+from smolux.weighting.base import Weighting
+
 from . import checkpoint as checkpoints
 from .driving import Elsewhere, Threads
 from .planning import decided

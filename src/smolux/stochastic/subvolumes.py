@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.rng import stream
-from ..core.state import (
+from smolux.core.rng import stream
+from smolux.core.state import (
     BUDGET,
     CLOCKS,
     DONE,
@@ -41,11 +41,12 @@ from ..core.state import (
     hand_on,
     new_tally,
 )
-from ..methods.base import merged, size_of
-from ..observables import add_up
-from ..processes.base import PairProcess
-from ..runtime import room
-from ..settings.simulation import LEAST
+from smolux.methods.base import merged, size_of
+from smolux.observables import add_up
+from smolux.processes.base import PairProcess
+from smolux.runtime import room
+from smolux.settings.simulation import LEAST
+
 from .plan import Plan
 from .replicas import Group, empty_state, initial_populations
 

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..functions.content import digest
-from ..jit.compile import CompileError, entry, user_piece
-from ..kernels import FunctionKernel, Sum
-from ..kernels.base import Kernel
-from ..kernels.varying import Varying
-from ..weighting.base import Weighting
+from smolux.functions.content import digest
+from smolux.jit.compile import CompileError, entry, user_piece
+from smolux.kernels import FunctionKernel, Sum
+from smolux.kernels.base import Kernel
+from smolux.kernels.varying import Varying
+from smolux.weighting.base import Weighting
 
 Float = NDArray[np.float64]
 

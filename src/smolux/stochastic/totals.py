@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.splits import EXACT
-from ..core.state import (
+from smolux.core.splits import EXACT
+from smolux.core.state import (
     AT,
     BY_FACTOR,
     BY_KERNEL,
@@ -24,7 +24,8 @@ from ..core.state import (
     WORST_I,
     WORST_J,
 )
-from ..processes.base import LoneProcess, PairProcess
+from smolux.processes.base import LoneProcess, PairProcess
+
 from .plan import Plan
 from .replicas import Group
 from .subvolumes import Divided

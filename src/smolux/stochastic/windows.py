@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from ..core.state import LIMIT, Windows
-from ..errors import InputError
-from ..functions.time import TimeFunction
-from ..functions.user_function import golden
-from ..kernels.base import Kernel
-from ..processes import Removal, Source
-from ..processes.base import PairProcess, Process
-from ..weighting import Number
-from ..weighting.base import Weighting
+from smolux.core.state import LIMIT, Windows
+from smolux.errors import InputError
+from smolux.functions.time import TimeFunction
+from smolux.functions.user_function import golden
+from smolux.kernels.base import Kernel
+from smolux.processes import Removal, Source
+from smolux.processes.base import PairProcess, Process
+from smolux.weighting import Number
+from smolux.weighting.base import Weighting
+
 from .remembered import timed
 
 #: windows of time for bounds of a factor that varies: pieces of each octave, first octave

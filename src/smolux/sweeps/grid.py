@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import smolux
+from smolux import results
+from smolux.analysis.sweeps import gather
+from smolux.case import Case
+from smolux.errors import InputError, Interrupted, quiet
+from smolux.runtime.executors import adapted, completed, opened
+from smolux.runtime.progress import Progress
+from smolux.runtime.resources import available_memory
 
-from .. import results
-from ..analysis.sweeps import gather
-from ..case import Case
-from ..errors import InputError, Interrupted, quiet
-from ..runtime.executors import adapted, completed, opened
-from ..runtime.progress import Progress
-from ..runtime.resources import available_memory
 from .over import read_axes
 from .points import Folder, Point, Sweep, make_sweep
 

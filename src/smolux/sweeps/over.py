@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..case import read_value
-from ..errors import InputError
+from smolux.case import read_value
+from smolux.errors import InputError
 
 #: points that a sweep may have; more are a slip in a range
 MOST_POINTS = 100_000

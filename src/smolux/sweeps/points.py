@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from ..case import Case, parse
-from ..case.write import to_toml, value
-from ..errors import InputError
-from ..runtime.files import replacing
+from smolux.case import Case, parse
+from smolux.case.write import to_toml, value
+from smolux.errors import InputError
+from smolux.runtime.files import replacing
+
 from .over import Axis
 
 #: messages that are told of a sweep in which many points are wrong

@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..functions.intervals import Interval
-from ..functions.law import proved_or_tried
-from ..kernels.base import Kernel
-from ..kernels.majorant import Majorant
-from ..kernels.numeric import interval_bounds, sampled_bounds
+from smolux.functions.intervals import Interval
+from smolux.functions.law import proved_or_tried
+from smolux.kernels.base import Kernel
+from smolux.kernels.majorant import Majorant
+from smolux.kernels.numeric import interval_bounds, sampled_bounds
 
 Float = NDArray[np.float64]
 

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from ..functions.intervals import Interval
-from ..kernels.base import Kernel
-from ..kernels.majorant import Majorant
+from smolux.functions.intervals import Interval
+from smolux.kernels.base import Kernel
+from smolux.kernels.majorant import Majorant
+
 from .base import Weighting
 from .weight_function import power_interval, power_majorant
 

@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.base import Kernel
-from ..kernels.majorant import Majorant
+from smolux.kernels.base import Kernel
+from smolux.kernels.majorant import Majorant
+
 from .base import Float, Weighting
 
 

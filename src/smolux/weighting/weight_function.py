@@ -10,12 +10,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import is_number
-from ..errors import InputError, Problem
-from ..functions.intervals import Interval
-from ..functions.size import SizeFunction
-from ..kernels.base import Kernel
-from ..kernels.majorant import Majorant
+from smolux.checks import is_number
+from smolux.errors import InputError, Problem
+from smolux.functions.intervals import Interval
+from smolux.functions.size import SizeFunction
+from smolux.kernels.base import Kernel
+from smolux.kernels.majorant import Majorant
+
 from .base import Float, Weighting
 
 #: the largest power of the size that makes sense

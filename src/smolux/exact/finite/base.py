@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import InputError, did_you_mean
-from ..base import check_sizes
+from smolux.errors import InputError, did_you_mean
+from smolux.exact.base import check_sizes
 
 if TYPE_CHECKING:
-    from ...model import Model
+    from smolux.model import Model
 
 Float = NDArray[np.float64]
 
@@ -200,10 +200,10 @@ def find(model: Model, particles: int) -> FiniteLaw | None:
     FiniteLaw or None
         None if no closed law is known.
     """
-    from ..additive import Additive
-    from ..constant import Constant
-    from ..find import solution
-    from ..multiplicative import Multiplicative
+    from smolux.exact.additive import Additive
+    from smolux.exact.constant import Constant
+    from smolux.exact.find import solution
+    from smolux.exact.multiplicative import Multiplicative
 
     exact = solution(model)
     names = {Constant: "constant", Additive: "additive", Multiplicative: "multiplicative"}

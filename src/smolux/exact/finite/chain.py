@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from smolux.errors import InputError
 
 Float = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from ...core.state import BOUND, FLOOR, LARGEST, MAJORANT, SMALLEST
-from ...jit.compile import cold_piece, piece
+from smolux.core.state import BOUND, FLOOR, LARGEST, MAJORANT, SMALLEST
+from smolux.jit.compile import cold_piece, piece
 
 
 def level_edges() -> np.ndarray:

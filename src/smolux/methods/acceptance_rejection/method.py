@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core.loop import Pieces
-from ...core.state import (
+from smolux.core.loop import Pieces
+from smolux.core.state import (
     FLOOR,
     LARGEST,
     MAJORANT,
@@ -23,8 +23,9 @@ from ...core.state import (
     WORST_J,
     State,
 )
-from ...errors import InputError
-from ..base import Float, Int, Method, Rates, enlarged, spread
+from smolux.errors import InputError
+from smolux.methods.base import Float, Int, Method, Rates, enlarged, spread
+
 from .levels import level_edges, level_of
 from .pieces import AHEAD, bind
 from .store import APART, HIGH, LOW, Work

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import rng
-from ...core.bounds import ROUNDING, note_bad, note_largest, repair
-from ...core.burst import NOT_PLAIN, PLAIN, Burst, make_draw_one
-from ...core.loop import PATIENCE, Pieces
-from ...core.slots import slot_of
-from ...core.state import (
+from smolux.core import rng
+from smolux.core.bounds import ROUNDING, note_bad, note_largest, repair
+from smolux.core.burst import NOT_PLAIN, PLAIN, Burst, make_draw_one
+from smolux.core.loop import PATIENCE, Pieces
+from smolux.core.slots import slot_of
+from smolux.core.state import (
     FIRST,
     FLOOR,
     LARGEST,
@@ -29,10 +29,11 @@ from ...core.state import (
     VALUE,
     VOLUME,
 )
-from ...core.store import Store, pieces_of
-from ...core.together import largest_rate, takes
-from ...jit.compile import at, cold_piece, piece
-from ...jit.prefetch import prefetch
+from smolux.core.store import Store, pieces_of
+from smolux.core.together import largest_rate, takes
+from smolux.jit.compile import at, cold_piece, piece
+from smolux.jit.prefetch import prefetch
+
 from .levels import renew_majorant
 from .store import APART, SLACK, VAIN, renew_all, rescan, seek_apart, size_of, view, watch
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.state import (
+from smolux.core.state import (
     FIRST,
     LARGEST,
     LIMIT,
@@ -18,7 +18,8 @@ from ...core.state import (
     STORED,
     TRIALS,
 )
-from ...jit.compile import at, cold_piece, piece
+from smolux.jit.compile import at, cold_piece, piece
+
 from .levels import level_of
 
 # Entries of Work.apart.

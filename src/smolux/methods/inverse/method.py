@@ -7,10 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core.loop import Pieces
-from ...core.state import LARGEST, PARTICLES, STORED, State
-from ...errors import InputError
-from ..base import Int, Method, Rates, enlarged, spread
+from smolux.core.loop import Pieces
+from smolux.core.state import LARGEST, PARTICLES, STORED, State
+from smolux.errors import InputError
+from smolux.methods.base import Int, Method, Rates, enlarged, spread
+
 from .pieces import bind
 from .store import Work
 from .sums import BLOCK

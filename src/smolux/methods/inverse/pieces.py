@@ -7,12 +7,23 @@ from typing import Any
 
 import numpy as np
 
-from ...core import rng
-from ...core.bounds import note_bad, note_largest
-from ...core.loop import Pieces
-from ...core.state import FIRST, LARGEST, PARTICLES, SECOND, SINCE, STORED, TRIALS, VALUE, VOLUME
-from ...core.store import Store, pieces_of
-from ...jit.compile import cold_piece, piece
+from smolux.core import rng
+from smolux.core.bounds import note_bad, note_largest
+from smolux.core.loop import Pieces
+from smolux.core.state import (
+    FIRST,
+    LARGEST,
+    PARTICLES,
+    SECOND,
+    SINCE,
+    STORED,
+    TRIALS,
+    VALUE,
+    VOLUME,
+)
+from smolux.core.store import Store, pieces_of
+from smolux.jit.compile import cold_piece, piece
+
 from .store import double, make_visit, pick, size_at, take, top_of, view
 from .sums import find, find_large, shift, weigh
 

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import rng
-from ...core.slots import slot_top
-from ...core.state import LARGEST, LONE_BITS, SINCE, STORED
-from ...jit.compile import cold_piece, piece
+from smolux.core import rng
+from smolux.core.slots import slot_top
+from smolux.core.state import LARGEST, LONE_BITS, SINCE, STORED
+from smolux.jit.compile import cold_piece, piece
 
 
 class Work(NamedTuple):

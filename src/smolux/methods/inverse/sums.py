@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...jit.compile import piece
+from smolux.jit.compile import piece
 
 #: sums are kept for blocks of this many sizes: a search looks at blocks, then inside one
 BLOCK = 32

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...kernels.majorant import Majorant
-from ..base import Float, Int, Rates
+from smolux.kernels.majorant import Majorant
+from smolux.methods.base import Float, Int, Rates
 
 #: the tables are this much above what they are computed to be: rounding differs between programs
 _ROUNDING = 1e-12
@@ -28,7 +28,7 @@ _MOST_HALVINGS = 500
 
 
 class Tables(NamedTuple):
-    """The majorant over slots for S stages; see `smolux.methods.low_rank.method.store.Work`."""
+    """The majorant over slots for S stages; see `smolux.methods.low_rank.store.Work`."""
 
     factor: Float
     shares: Float

@@ -7,11 +7,22 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core.loop import Pieces
-from ...core.slots import slot_edges
-from ...core.state import LARGEST, PARTICLES, SMALLEST, STORED, TIME, VALUE, WORST_I, WORST_J, State
-from ...errors import InputError
-from ..base import Int, Method, Rates, enlarged, spread
+from smolux.core.loop import Pieces
+from smolux.core.slots import slot_edges
+from smolux.core.state import (
+    LARGEST,
+    PARTICLES,
+    SMALLEST,
+    STORED,
+    TIME,
+    VALUE,
+    WORST_I,
+    WORST_J,
+    State,
+)
+from smolux.errors import InputError
+from smolux.methods.base import Int, Method, Rates, enlarged, spread
+
 from .majorants import Tables, fill_bounds, fitted, from_powers, units_of
 from .pieces import bind
 from .segment_tree import FANOUT, levels_of

@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ...core import rng
-from ...core.bounds import ROUNDING, note_bad, repair
-from ...core.loop import PATIENCE, Pieces
-from ...core.state import FIRST, FLOOR, PARTICLES, SECOND, TRIALS, VALUE, VOLUME
-from ...core.store import Store, pieces_of
-from ...core.together import largest_rate, slots_with, takes
-from ...jit.compile import cold_piece, piece
-from ...jit.prefetch import prefetch
+from smolux.core import rng
+from smolux.core.bounds import ROUNDING, note_bad, repair
+from smolux.core.loop import PATIENCE, Pieces
+from smolux.core.state import FIRST, FLOOR, PARTICLES, SECOND, TRIALS, VALUE, VOLUME
+from smolux.core.store import Store, pieces_of
+from smolux.core.together import largest_rate, slots_with, takes
+from smolux.jit.compile import cold_piece, piece
+from smolux.jit.prefetch import prefetch
+
 from .segment_tree import add, find, find_mixed
 from .store import (
     APART,

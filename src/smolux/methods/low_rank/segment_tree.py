@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...jit.compile import cold_piece, piece
+from smolux.jit.compile import cold_piece, piece
 
 #: children of a node; with more, an event adds to fewer sums, and looks at more of them
 FANOUT = 4

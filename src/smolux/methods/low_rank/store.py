@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.slots import slot_of
-from ...core.state import LARGEST, SINCE, STORED
-from ...jit.compile import cold_piece, piece
+from smolux.core.slots import slot_of
+from smolux.core.state import LARGEST, SINCE, STORED
+from smolux.jit.compile import cold_piece, piece
 
 # Entries of Work.meta.
 STAGE = 0  # row of the tables in force; -1: the tree is to be built
@@ -42,7 +42,7 @@ class Work(NamedTuple):
         Particles in each slot (whole numbers).
     tree : int64 array of shape (R, F, T)
         Segment trees over ``number * grains``, without a particle that is held apart; see
-        `smolux.methods.low_rank.method.segment_tree`.
+        `smolux.methods.low_rank.segment_tree`.
     levels : int64 array
         Where their levels begin.
     start, room, order : int64 arrays of shape (R, C)

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from ...core.slots import octave
-from ...core.state import BOUND, LARGEST, PARTICLES, SINCE
-from ...jit.compile import cold_piece, piece
+from smolux.core.slots import octave
+from smolux.core.state import BOUND, LARGEST, PARTICLES, SINCE
+from smolux.jit.compile import cold_piece, piece
+
 from .segment_tree import build
 from .store import APART, SEEK, STAGE, WANTED, rescan
 

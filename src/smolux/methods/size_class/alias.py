@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...jit.compile import cold_piece, piece
-from ...jit.wide import upper_half
+from smolux.jit.compile import cold_piece, piece
+from smolux.jit.wide import upper_half
 
 _HALF, _LOWER = np.uint64(32), np.uint64((1 << 32) - 1)
 _WORD, _UPPER = 2.0**64, 2.0**32

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...jit.compile import at, cold_piece, piece
-from ...jit.prefetch import prefetch
+from smolux.jit.compile import at, cold_piece, piece
+from smolux.jit.prefetch import prefetch
+
 from .state import AHEAD, CHUNK, FREE, NEXT, SINGLE, SLOT, SLOT_BITS
 
 #: entries are asked for so far from the ends of lists, as these move

@@ -7,12 +7,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core.bounds import ROUNDING
-from ...core.loop import Pieces
-from ...core.slots import slot_edges
-from ...core.state import MAJORANT, PARTICLES, SINCE, TIME, State
-from ...errors import InputError
-from ..base import Int, Method, Rates, Words, enlarged, size_of, spread
+from smolux.core.bounds import ROUNDING
+from smolux.core.loop import Pieces
+from smolux.core.slots import slot_edges
+from smolux.core.state import MAJORANT, PARTICLES, SINCE, TIME, State
+from smolux.errors import InputError
+from smolux.methods.base import Int, Method, Rates, Words, enlarged, size_of, spread
+
 from . import pieces
 from .split import Pile, collect, split
 from .state import AHEAD, BITS, CHUNK, FREE, META, NEXT, SINGLE, SPAN, STALE, WIDEST, Work

@@ -7,16 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from ...core import rng
-from ...core.bounds import ROUNDING, note_bad, repair
-from ...core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
-from ...core.loop import PATIENCE, Pieces
-from ...core.state import FIRST, MAJORANT, PARTICLES, SINCE, TRIALS, VOLUME
-from ...core.store import Store, pieces_of
-from ...core.together import largest_rate, slots_with, takes
-from ...jit.compile import at, cold_piece, piece
-from ...jit.prefetch import prefetch
-from ...jit.wide import upper_half
+from smolux.core import rng
+from smolux.core.bounds import ROUNDING, note_bad, repair
+from smolux.core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
+from smolux.core.loop import PATIENCE, Pieces
+from smolux.core.state import FIRST, MAJORANT, PARTICLES, SINCE, TRIALS, VOLUME
+from smolux.core.store import Store, pieces_of
+from smolux.core.together import largest_rate, slots_with, takes
+from smolux.jit.compile import at, cold_piece, piece
+from smolux.jit.prefetch import prefetch
+from smolux.jit.wide import upper_half
+
 from . import alias
 from .lists import place_in, place_of_particle, size_at, size_of_particle
 from .state import AHEAD, BITS, BLOCK, FREE, NEXT, PAIRS, SLOT, SLOT_BITS, STALE, view

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.rng import below
-from ...jit.compile import entry
+from smolux.core.rng import below
+from smolux.jit.compile import entry
+
 from .lists import append, is_list, place_of, size_at
 from .state import BITS, SINGLE, WIDEST, view
 
@@ -24,7 +25,7 @@ class Pile(NamedTuple):
     sizes : int64 array
         Of the particles of all lists, class by class.
     bits, widest : int
-        Of the store, see `smolux.methods.size_class.method.state`.
+        Of the store, see `smolux.methods.size_class.state`.
     """
 
     number: NDArray[np.int64]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...jit.compile import piece
+from smolux.jit.compile import piece
 
 #: candidates drawn ahead, so that their memory is there when it is needed
 AHEAD = 32

@@ -6,8 +6,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...core.slots import slot_of
-from ...jit.compile import at, cold_piece, piece
+from smolux.core.slots import slot_of
+from smolux.jit.compile import at, cold_piece, piece
+
 from .lists import append, cut, duplicate, is_list, place_of, size_at
 from .state import AHEAD, BITS, CHUNK, FREE, NEXT, SHARE, SINGLE, STALE, WIDEST
 

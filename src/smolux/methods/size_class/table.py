@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from ...core.slots import slot_top
-from ...core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
-from ...jit.compile import cold_piece, piece
+from smolux.core.slots import slot_top
+from smolux.core.state import BOUND, LARGEST, MAJORANT, PARTICLES, SINCE
+from smolux.jit.compile import cold_piece, piece
+
 from . import alias
 from .state import AHEAD, BITS, BLOCK, NEXT, PAIRS, SHARE, SPAN, STALE
 

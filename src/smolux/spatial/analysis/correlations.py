@@ -8,8 +8,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import InputError
-from ..box import Box
+from smolux.errors import InputError
+from smolux.spatial.box import Box
+
 from .morphology import Discs, Snapshot, snapshot, within_half_period
 
 Float = NDArray[np.float64]

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from smolux.errors import InputError
+
 from .morphology import Discs, shapes, snapshot
 
 Float = NDArray[np.float64]

@@ -9,11 +9,11 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import optimize
 
-from ... import kernels
-from ...errors import InputError
-from ...initial import monodisperse
-from ...model import Model
-from ..results.result import log_of, system_of
+from smolux import kernels
+from smolux.errors import InputError
+from smolux.initial import monodisperse
+from smolux.model import Model
+from smolux.spatial.results.result import log_of, system_of
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]

@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import InputError
-from ..box import Box
-from ..system import System
+from smolux.errors import InputError
+from smolux.spatial.box import Box
+from smolux.spatial.system import System
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -127,7 +127,7 @@ def snapshot(discs: Discs, time: float | None = None) -> Snapshot:
     InputError
         If the time was not reached, or cannot be replayed.
     """
-    from ..results.result import replay, system_of
+    from smolux.spatial.results.result import replay, system_of
 
     if isinstance(discs, Snapshot):
         return discs

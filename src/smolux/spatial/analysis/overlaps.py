@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
-from ..box import Box
+from smolux.errors import InputError
+from smolux.spatial.box import Box
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -38,7 +38,7 @@ def overlapping(position: Float, radius: Float, box: Box, most: int) -> list[tup
     list of tuple of int
         Pairs of discs, at most one for each disc with the discs before it.
     """
-    from ..events.grid import find_overlaps
+    from smolux.spatial.events.grid import find_overlaps
 
     cells = cells_for(box, 2 * float(radius.max()), len(position))
     out = np.empty((most, 2), np.int64)
@@ -71,7 +71,7 @@ def placed_at_random(radius: Float, box: Box, contact: str, rng: NDArray[np.uint
     InputError
         If the discs do not fit.
     """
-    from ..events.grid import place
+    from smolux.spatial.events.grid import place
 
     n = len(radius)
     order = np.argsort(-radius, kind="stable")

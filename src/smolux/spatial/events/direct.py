@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...jit.compile import entry, piece
+from smolux.jit.compile import entry, piece
+
 from .geometry import (
     FILLED,
     NARROW,

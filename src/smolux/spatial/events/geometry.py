@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...jit.compile import piece
+from smolux.jit.compile import piece
 
 #: a cluster that leaves less than this share of an axis free fills the box along it
 FILLED = 1e-12

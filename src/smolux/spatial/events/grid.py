@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ...core.rng import uniform
-from ...jit.compile import entry, piece
+from smolux.core.rng import uniform
+from smolux.jit.compile import entry, piece
 
 
 @piece

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...jit.compile import cold_piece, piece
+from smolux.jit.compile import cold_piece, piece
+
 from .flight import (
     DISC,
     EVENT,

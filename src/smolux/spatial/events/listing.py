@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from ...jit.compile import cold_piece, piece
+from smolux.jit.compile import cold_piece, piece
+
 from .flight import (
     CELL,
     CHAIN,

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...jit.compile import cold_piece, piece
+from smolux.jit.compile import cold_piece, piece
+
 from .geometry import larger, shift
 from .grid import neighbour
 from .steps import (

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from ...jit.compile import entry, piece
+from smolux.jit.compile import entry, piece
+
 from .flight import (
     BLOCK,
     BLOCKS,

@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from ...jit.compile import cold_piece, piece
+from smolux.jit.compile import cold_piece, piece
+
 from . import minimising
 from .geometry import larger, shift, smaller
 from .minimising import FAILED, FULL, LINKED, PARTED, RELOAD, root

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...jit.compile import entry, piece
+from smolux.jit.compile import entry, piece
+
 from .geometry import add_axis, apart, shift
 
 

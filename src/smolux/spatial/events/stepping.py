@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ...jit.compile import cold_piece, entry, piece
+from smolux.jit.compile import cold_piece, entry, piece
+
 from . import relax, steps
 from .direct import REST
 from .geometry import larger, smaller

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...jit.compile import cold_piece, piece
+from smolux.jit.compile import cold_piece, piece
+
 from .geometry import FILLED, larger, shift, smaller
 from .grid import insert, neighbour
 

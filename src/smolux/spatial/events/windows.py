@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from ...jit.compile import cold_piece, entry, piece
+from smolux.jit.compile import cold_piece, entry, piece
+
 from . import listing, predicting
 from .flight import (
     AT_REST,

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..results.trace import Trace
-from ..system import System
+from smolux.spatial.results.trace import Trace
+from smolux.spatial.system import System
 
 Float = NDArray[np.float64]
 

@@ -10,10 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.overlaps import cells_for
-from ..results.eventlog import Logger, reasons
-from ..results.trace import Trace
-from ..system import System
+from smolux.spatial.analysis.overlaps import cells_for
+from smolux.spatial.results.eventlog import Logger, reasons
+from smolux.spatial.results.trace import Trace
+from smolux.spatial.system import System
+
 from .base import Run, SpatialMethod
 
 Float = NDArray[np.float64]
@@ -25,7 +26,7 @@ _ROOM = 4096
 
 @cache
 def _loop(search: str, dimension: int) -> Callable[..., Any]:
-    from ..events import direct
+    from smolux.spatial.events import direct
 
     return direct.bind(getattr(direct, search), dimension)
 
@@ -36,7 +37,7 @@ class DirectRun(Run):
     def __init__(
         self, system: System, search: str, cells: NDArray[np.int64], patience: float
     ) -> None:
-        from ..events import direct
+        from smolux.spatial.events import direct
 
         n, d = system.position.shape
         contact = system.wall_contact == "surface"

@@ -10,11 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, Problem
-from ...runtime.room import needed
-from ..results.eventlog import Logger, reasons
-from ..results.trace import Trace, empty_series, observe
-from ..system import System
+from smolux.errors import InputError, Problem
+from smolux.runtime.room import needed
+from smolux.spatial.results.eventlog import Logger, reasons
+from smolux.spatial.results.trace import Trace, empty_series, observe
+from smolux.spatial.system import System
+
 from .base import LISTS, Run, SpatialMethod
 
 Float = NDArray[np.float64]
@@ -45,7 +46,7 @@ _HOPELESS = (
 
 @cache
 def _loop(dimension: int) -> Callable[..., Any]:
-    from ..events import stepping
+    from smolux.spatial.events import stepping
 
     return stepping.bind(dimension)
 
@@ -54,7 +55,7 @@ class SteppingRun(Run):
     """A run of the time-stepping method."""
 
     def __init__(self, system: System, times: Float, settings: TimeStepping) -> None:
-        from ..events import direct, minimising, stepping, steps
+        from smolux.spatial.events import direct, minimising, stepping, steps
 
         n, d = system.position.shape
         self.system, self.settings = system, settings

@@ -10,11 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...runtime.room import needed
-from ..analysis.overlaps import cells_for
-from ..results.eventlog import Logger, reasons
-from ..results.trace import Trace
-from ..system import System
+from smolux.runtime.room import needed
+from smolux.spatial.analysis.overlaps import cells_for
+from smolux.spatial.results.eventlog import Logger, reasons
+from smolux.spatial.results.trace import Trace
+from smolux.spatial.system import System
+
 from .base import LISTS, Run, SpatialMethod
 
 Float = NDArray[np.float64]
@@ -32,7 +33,7 @@ _BLOCKS_FROM = 4.0
 
 @cache
 def _loop(dimension: int) -> Callable[..., Any]:
-    from ..events import windows
+    from smolux.spatial.events import windows
 
     return windows.bind(dimension)
 
@@ -112,7 +113,7 @@ class WindowedRun(Run):
     """A run of the windowed method."""
 
     def __init__(self, system: System, settings: Windowed, before: Trace | None = None) -> None:
-        from ..events import direct, flight, geometry, packing
+        from smolux.spatial.events import direct, flight, geometry, packing
 
         self.system, self.settings = system, settings
         self._flight, self._packing, self._events = flight, packing, direct.Events

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..system import System
+from smolux.spatial.system import System
+
 from .trace import Log, Series, empty_series, observe
 
 Float = NDArray[np.float64]
@@ -50,7 +51,7 @@ class Player:
     """Goes through a log from its start."""
 
     def __init__(self, system: System, log: Log) -> None:
-        from ..events import replay
+        from smolux.spatial.events import replay
 
         n, d = system.position.shape
         self.system, self.log, self._compiled = system, log, replay

@@ -8,11 +8,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from ... import results
-from ...checks import numbers
-from ...errors import InputError
-from ..box import Box
-from ..system import System
+from smolux import results
+from smolux.checks import numbers
+from smolux.errors import InputError
+from smolux.spatial.box import Box
+from smolux.spatial.system import System
+
 from .genealogy import merger_tree
 from .replay import Merging, replayed
 from .trace import ORDERS, Log, Series, Trace, size_edges

@@ -11,11 +11,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import numbers
-from ...errors import InputError
-from ...runtime.files import replacing
-from ..box import Box
-from ..system import System
+from smolux.checks import numbers
+from smolux.errors import InputError
+from smolux.runtime.files import replacing
+from smolux.spatial.box import Box
+from smolux.spatial.system import System
+
 from .replay import Player
 from .result import log_of, system_of
 
