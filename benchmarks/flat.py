@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from smolux.core import rng
-from smolux.core.rng import streams
+from smolux.core.seeds import streams
 
 
 def flat_loop(rate: Callable[..., Any], constant: bool) -> Callable[..., Any]:

@@ -6,48 +6,50 @@ of result (an `xarray.Dataset`).
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from .runtime.lazy import lazily
 
 __version__ = "0.1.0"
 
-#: public name -> module that defines it; a module stands for itself
-_LAZY = {
-    "Model": "smolux.model",
-    "simulate": "smolux.stochastic.simulation",
-    "resume": "smolux.stochastic.simulation",
-    "solve": "smolux.deterministic",
-    "sweep": "smolux.sweeps",
-    "ensemble": "smolux.ensembles",
-    "efficiency": "smolux.ensembles",
-    "summary": "smolux.analysis",
-    "law": "smolux.functions.stated",
-    "InputError": "smolux.errors",
-    "WorkerError": "smolux.errors",
-    "Interrupted": "smolux.errors",
-    "SmoluxWarning": "smolux.errors",
-    "Progress": "smolux.runtime.progress",
-    **dict.fromkeys(
-        (
-            "analysis",
-            "case",
-            "conformance",
-            "deterministic",
-            "ensembles",
-            "exact",
-            "initial",
-            "kernels",
-            "methods",
-            "plotting",
-            "processes",
-            "results",
-            "spatial",
-            "weighting",
-        )
-    ),
-    "plot": "smolux.plotting",
-}
-_MODULES = {"plot"}
+_MODULES = (
+    "analysis",
+    "case",
+    "conformance",
+    "deterministic",
+    "ensembles",
+    "exact",
+    "initial",
+    "kernels",
+    "methods",
+    "plotting",
+    "processes",
+    "results",
+    "spatial",
+    "weighting",
+)
+
+__getattr__, __dir__ = lazily(
+    __name__,
+    {
+        "InputError": "errors",
+        "Interrupted": "errors",
+        "Model": "model",
+        "Progress": "runtime.progress",
+        "SmoluxWarning": "errors",
+        "WorkerError": "errors",
+        "efficiency": "ensembles",
+        "ensemble": "ensembles",
+        "law": "functions.stated",
+        "plot": "plotting.",
+        "resume": "stochastic.simulation",
+        "simulate": "stochastic.simulation",
+        "solve": "deterministic",
+        "summary": "analysis",
+        "sweep": "sweeps",
+        **{name: f"{name}." for name in _MODULES},
+    },
+)
 
 __all__ = [
     "InputError",
@@ -110,16 +112,3 @@ if TYPE_CHECKING:
     from .runtime.progress import Progress
     from .stochastic.simulation import resume, simulate
     from .sweeps import sweep
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
-        raise AttributeError(f"module 'smolux' has no attribute {name!r}")
-    module = importlib.import_module(_LAZY[name] or f"smolux.{name}")
-    value = module if _LAZY[name] is None or name in _MODULES else getattr(module, name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return __all__

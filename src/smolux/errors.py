@@ -124,6 +124,24 @@ class Interrupted(KeyboardInterrupt):
         self.checkpoint = checkpoint
 
 
+class SolverError(RuntimeError):
+    """The rate equations could not be solved any further.
+
+    Attributes
+    ----------
+    time : float
+        How far the solution came.
+    dataset : xarray.Dataset or None
+        What was computed; output times not reached are NaN.
+    """
+
+    dataset: object = None
+
+    def __init__(self, message: str, time: float) -> None:
+        super().__init__(message)
+        self.time = time
+
+
 class WorkerError(RuntimeError):
     """The processes that compute die, again and again: no memory, a crash, a node that is gone.
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
+import subprocess
+import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +16,8 @@ from command import call
 
 import smolux
 from smolux.case import load, parse, spatial
-from smolux.cli import catalogue, comparing, estimate, showing, templates
+from smolux.cli import app, cautions
+from smolux.cli.commands import compare, kernels, new, show
 from smolux.errors import InputError, OutOfMemoryError, WorkerError
 from smolux.kernels import KERNELS
 
@@ -43,10 +48,10 @@ def folder(tmp_path, monkeypatch):
 
 def test_help_names_every_command():
     text = call("--help").stdout
-    for name in (
-        "demo", "new", "check", "run", "show", "plot", "compare", "kernels", "verify", "--version",
-    ):  # fmt: skip
-        assert name in text
+    for name, summary in app.COMMANDS.items():
+        assert f"  {name} " in text
+        assert summary in text  # not cut off
+    assert "--version" in text
     assert call("--version").stdout == f"smolux {smolux.__version__}\n"
 
 
@@ -84,7 +89,7 @@ def test_an_unknown_kernel_is_named_with_the_nearest():
 
 
 def test_what_gels_says_when():
-    rows = {row[0]: row for row in catalogue.overview()}
+    rows = {row[0]: row for row in kernels.overview()}
     assert rows["multiplicative"][2] == "at t = 1"
     assert rows["constant"][1:4] == ("0", "no", "yes")
 
@@ -92,7 +97,7 @@ def test_what_gels_says_when():
 # --- new -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", templates.TEMPLATES)
+@pytest.mark.parametrize("name", new.TEMPLATES)
 def test_every_template_is_a_commented_case_that_can_be_run(name, folder):
     call("new", "mine", "--template", name)
     text = (folder / "mine.toml").read_text()
@@ -111,7 +116,7 @@ def test_new_never_overwrites(folder):
 
 def test_new_lists_its_templates_and_knows_the_nearest(folder):
     for arguments in (("new",), ("new", "--list")):
-        assert all(name in call(*arguments).stdout for name in templates.TEMPLATES)
+        assert all(name in call(*arguments).stdout for name in new.TEMPLATES)
     assert "did you mean 'shattering'" in call("new", "x", "-t", "shatering", code=2).stderr
     assert "there is no folder" in call("new", "none/x", code=2).stderr
     assert not (folder / "x.toml").exists()
@@ -178,9 +183,9 @@ def test_a_case_that_was_changed_is_no_case_to_go_on_with(folder):
     call("run", "small.toml", "-o", "x", "-s", "solve.tolerance=1e-5")
     file = folder / "x" / "case.toml"
     text = file.read_text()
-    for old, new in (("500", "600"), ("scale = 1.0", "scale = 2.0"), ("1e-05", "1e-06")):
+    for old, other in (("500", "600"), ("scale = 1.0", "scale = 2.0"), ("1e-05", "1e-06")):
         assert old in text
-        file.write_text(text.replace(old, new))
+        file.write_text(text.replace(old, other))
         assert "was changed since the run was begun" in call("run", "x", code=2).stderr
     file.write_text(text.replace("report = true", "report = false"))
     call("run", "x")
@@ -239,7 +244,7 @@ def test_show_and_plot(folder):
 def test_show_cuts_long_tables(folder):
     call("run", "small.toml", "--set", "run.times={stop=1, count=40}", "-o", "long")
     assert "12 of 40 times are shown" in call("show", "long").stdout
-    shown = showing.chosen(smolux.results.load(folder / "long" / "results.nc"), 12)["time"].values
+    shown = show.chosen(smolux.results.load(folder / "long" / "results.nc"), 12)["time"].values
     assert (len(shown), shown[0], shown[-1]) == (12, 0.0, 1.0)
     whole = call("show", "long", "--all").stdout
     assert "are shown" not in whole
@@ -250,9 +255,35 @@ def test_show_cuts_long_tables(folder):
 
 
 def test_check_tells_the_cost(folder):
-    output = call("check", "small.toml").stdout
-    for word in ("is valid", "collisions", "time", "memory", "output", "No warnings"):
-        assert word in output
+    words = ("is valid", "memory", "output", "No warnings")
+    quick = call("check", "small.toml").stdout
+    whole = call("check", "small.toml", "--cost").stdout
+    for word in words:
+        assert word in quick
+        assert word in whole
+    for word in ("collisions   about", "time         about"):
+        assert word not in quick
+        assert word in whole
+    assert "smolux check small.toml --cost" in quick
+
+
+def test_check_loads_no_compiler():
+    """So that it answers at once: for every template without discs."""
+    code = (
+        "import sys\nfrom smolux.case import parse\nfrom smolux.cli.commands import check, new\n"
+        "for name in new.TEMPLATES:\n"
+        "    if name != 'ballistic-2d':\n"
+        "        assert 'is valid' in check.text(parse(new.text(name)), name)\n"
+        "assert not {'numba', 'xarray', 'matplotlib'} & set(sys.modules), sys.modules.keys()\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("name", app.COMMANDS)
+def test_each_command_is_the_function_of_its_module(name):
+    command = getattr(importlib.import_module(f"smolux.cli.commands.{name}"), name)
+    page = call(name, "--help").stdout
+    assert inspect.cleandoc(command.__doc__).splitlines()[0] in " ".join(page.split())
 
 
 def test_check_tells_all_mistakes_with_lines(folder):
@@ -295,9 +326,9 @@ def test_what_is_compared_is_independent_and_alike(folder, monkeypatch):
         return made
 
     monkeypatch.setattr(smolux, "simulate", computed)
-    monkeypatch.setattr(comparing, "solve", computed)
+    monkeypatch.setattr(smolux, "solve", computed)
     case = load("small.toml", ["kernel.name=multiplicative"])
-    found = comparing.compute(case, ["inverse", "size-class", "solver"])
+    found = compare.compute(case, ["inverse", "size-class", "solver"])
     assert [settings.get("seed") for settings in given] == [7, 8, None]
     assert [settings.get("method") for settings in given] == ["inverse", "size-class", None]
     assert given[-1]["gel"] == "reacts"
@@ -308,16 +339,16 @@ def test_what_is_compared_is_independent_and_alike(folder, monkeypatch):
 def test_methods_share_the_level_of_a_table(monkeypatch):
     test = {"p_value": 0.004, "p_total": 0.5, "p_largest": 1.0, "found_beyond": 6.0}
     test |= {"largest_sigmas": 2.0, "where": "number_density"}
-    monkeypatch.setattr(comparing.analysis, "compare", lambda *_: xr.Dataset(attrs=test))
-    monkeypatch.setattr(comparing, "reference", lambda _: (comparing.EXACT, comparing.EXACT))
-    found = [comparing.Computed(name, None, 1.0, 0.0, 1.0) for name in ("one", "two", "three")]
+    monkeypatch.setattr(smolux.analysis, "compare", lambda *_: xr.Dataset(attrs=test))
+    monkeypatch.setattr(compare, "reference", lambda _: (compare.EXACT, compare.EXACT))
+    found = [compare.Computed(name, None, 1.0, 0.0, 1.0) for name in ("one", "two", "three")]
     for count in (1, 2, 3):
-        assert comparing.rows(found[:count])[2] == (count > 1)
+        assert compare.rows(found[:count])[2] == (count > 1)
 
 
 def test_compare_ends_with_1_if_a_method_differs(folder, monkeypatch):
     for agree, code in ((False, 1), (True, 0)):
-        monkeypatch.setattr(comparing, "rows", lambda found, a=agree: (comparing.EXACT, [], a))
+        monkeypatch.setattr(compare, "rows", lambda found, a=agree: (compare.EXACT, [], a))
         call("compare", "small.toml", "-m", "acceptance-rejection", code=code)
 
 
@@ -352,7 +383,7 @@ def test_no_memory_is_no_bug_of_ours(folder, monkeypatch):
     def full(*_: object) -> None:
         raise MemoryError("Unable to allocate 7 GiB")
 
-    monkeypatch.setattr(catalogue, "overview", full)
+    monkeypatch.setattr(kernels, "overview", full)
     result = call("kernels", code=2)
     assert "out of memory: Unable to allocate 7 GiB" in result.stderr
     assert "bug" not in result.stderr
@@ -362,7 +393,7 @@ def test_our_bugs_are_exit_code_1_with_a_file_and_no_traceback(folder, monkeypat
     def broken(*_: object) -> None:
         raise ZeroDivisionError("surprise")
 
-    monkeypatch.setattr(catalogue, "overview", broken)
+    monkeypatch.setattr(kernels, "overview", broken)
     result = call("kernels", code=1)
     assert "internal error: ZeroDivisionError: surprise" in result.stderr
     assert "Traceback" not in result.stderr
@@ -381,8 +412,6 @@ def test_a_folder_that_cannot_be_written_is_no_bug(folder, monkeypatch):
 
 
 def test_a_full_disk_leaves_the_results_somewhere(folder, monkeypatch):
-    from smolux.cli import running
-
     save = smolux.results.save
 
     def full(ds: object, path: object) -> None:
@@ -390,7 +419,7 @@ def test_a_full_disk_leaves_the_results_somewhere(folder, monkeypatch):
             raise OSError(28, f"cannot write {path}: No space left on device")
         save(ds, path)
 
-    monkeypatch.setattr(running.results, "save", full)
+    monkeypatch.setattr(smolux.results, "save", full)
     stderr = call("run", "small.toml", code=3).stderr
     assert "begin again with: smolux run small" in stderr  # there is no checkpoint
     kept = stderr.split("what was computed is in ")[1].split("\n")[0]
@@ -455,8 +484,8 @@ def test_check_warns_of_breakage_that_makes_many_particles():
     text = SMALL + '[initial]\nname = "monodisperse"\nsize = 1000000\n'
     shattering = '[[processes]]\nname = "shattering"\nrate = 0.1\n'
     case = parse(text + shattering)
-    (found,) = estimate._breakage(case, replace(case.run, particles=1000))
+    (found,) = cautions._breakage(case, replace(case.run, particles=1000))
     assert "shattering can break the mass up into 1e+09 particles of size 1" in found
     for text_ in (text, SMALL + shattering):  # without breakage, and with monomers
         case = parse(text_)
-        assert estimate._breakage(case, case.run) == []
+        assert cautions._breakage(case, case.run) == []

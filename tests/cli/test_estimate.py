@@ -8,7 +8,8 @@ import pytest
 import smolux
 from shared import KERNEL
 from smolux.case import parse
-from smolux.cli import checking, estimate
+from smolux.cli import cautions, estimate
+from smolux.cli.commands import check
 from smolux.errors import InputError
 from smolux.runtime import executors
 from smolux.stochastic import plan
@@ -27,7 +28,7 @@ def case(kernel: str, run: str = "times = [2]", rest: str = ""):
     [(1, 1, 2, 1.0), (4, 1, 2, 0.25), (1, 0.5, 3, 2.0), (0.1, 1, 2, None), (1, 1, 0.9, None)],
 )
 def test_the_gel_time_is_scaled_by_density_and_prefactor(density, scale, end, time):
-    found = estimate.physics_warnings(
+    found = cautions.physics_warnings(
         case(
             f'name = "multiplicative"\nscale = {scale}', f"times = [{end}]",
             f"[initial]\ndensity = {density}",
@@ -41,24 +42,24 @@ def test_the_gel_time_is_scaled_by_density_and_prefactor(density, scale, end, ti
 
 
 def test_other_starts_and_unknown_kernels():
-    (warning,) = estimate.physics_warnings(
+    (warning,) = cautions.physics_warnings(
         case('name = "multiplicative"', rest='[initial]\nname = "exponential"\nmean = 5')
     )
     assert "monomers of the same mass at t = 0.2, this initial condition sooner" in warning
-    (warning,) = estimate.physics_warnings(case('formula = "i*j"\ndegree = 2'))
+    (warning,) = cautions.physics_warnings(case('formula = "i*j"\ndegree = 2'))
     assert "may gel" in warning
-    (warning,) = estimate.physics_warnings(case('formula = "i*j"\ngels = true'))
+    (warning,) = cautions.physics_warnings(case('formula = "i*j"\ngels = true'))
     assert "at a time that is not known" in warning
-    (warning,) = estimate.physics_warnings(
+    (warning,) = cautions.physics_warnings(
         case('name = "multiplicative"', rest='[[processes]]\nname = "aggregation"\nvarying = "t"')
     )
     assert "at a time that is not known" in warning
-    assert estimate.physics_warnings(case('name = "constant"')) == []
+    assert cautions.physics_warnings(case('name = "constant"')) == []
 
 
 def test_what_breaks_clusters_up_may_prevent_a_gel():
     text = '[[processes]]\nname = "aggregation"\n[[processes]]\nname = "shattering"\nrate = 0.1\n'
-    assert estimate.physics_warnings(case('name = "multiplicative"', rest=text)) == []
+    assert cautions.physics_warnings(case('name = "multiplicative"', rest=text)) == []
 
 
 # --- mistakes that only the whole case shows -----------------------------------------------------
@@ -70,9 +71,9 @@ def test_rates_that_fall_below_zero_are_found_before_the_run():
         'rate = "0.01*(1 - t/400)"\n'
     )
     fine = case('name = "constant"', "times = [399]", text)
-    assert estimate.negative_rates(fine) == []
+    assert cautions.negative_rates(fine) == []
     with pytest.raises(InputError, match=r"at t = 400\.\d+; it must be"):
-        checking.text(case('name = "constant"', "times = [500]", text), "case.toml")
+        check.text(case('name = "constant"', "times = [500]", text), "case.toml")
 
 
 # --- cost ----------------------------------------------------------------------------------------
@@ -116,9 +117,8 @@ def test_extinction_is_foreseen():
 
 def test_one_replica_and_rare_sizes_are_told():
     rest = '[initial]\nname = "sizes"\ndensities = { 1 = 1.0, 50 = 1e-4 }\n'
-    found = estimate.estimate(
-        case('name = "constant"', "times = [1]\nparticles = 1000\nreplicas = 1", rest)
-    ).warnings
+    given = case('name = "constant"', "times = [1]\nparticles = 1000\nreplicas = 1", rest)
+    found = cautions.all_warnings(given, given.run)
     assert len(found) == 2
     assert "of size 50 there are fewer than 10" in found[0]
     assert "one replica gives no error bars" in found[1]
@@ -140,6 +140,16 @@ def test_what_can_happen_bounds_the_estimate():
         assert cost.collisions == pytest.approx(2 * 999, rel=0.05)
         assert cost.collisions <= 2 * 999
         assert "only about 1 of 1000" in cost.warnings[0]
+
+
+def test_no_method_takes_more_than_is_said_before_one_is_loaded():
+    """By which a run is let pass without a plan."""
+    for particles in (1, 100, 3000, 10**5, 10**7, 10**9):
+        run = replace(case('name = "constant"').run, particles=particles, replicas=3)
+        for method in smolux.methods.METHODS:
+            assert cautions.stores(replace(run, method=method.name), particles) <= (
+                cautions.stores_at_most(run)
+            )
 
 
 def small_pilot(times, collisions, volume, end, merging=True):
@@ -171,14 +181,14 @@ def test_what_a_run_refuses_the_check_refuses(monkeypatch):
     monkeypatch.setattr(plan, "available_memory", lambda: 1e9)
     many = case('name = "constant"', "times = [1]\nparticles = 1e9")
     with pytest.raises(InputError, match=r"case\.toml: the run needs about .* GB") as caught:
-        checking.text(many, "case.toml")
+        check.text(many, "case.toml")
     with pytest.raises(InputError) as refused:
         smolux.simulate(many.model, **many.run.arguments())
     assert caught.value.problems == [f"case.toml: {p}" for p in refused.value.problems]
     rest = '[solve]\ntimes = [1]\ngel = "reacts"\n[[processes]]\nname = "shattering"\nrate = 1\n'
     solved = parse(f'[kernel]\nname = "constant"\n{rest}')
     with pytest.raises(InputError, match="for aggregation alone"):
-        checking.text(solved, "case.toml")
+        check.text(solved, "case.toml")
     monkeypatch.setattr(executors, "find_spec", lambda name: None)
     with pytest.raises(InputError, match="needs distributed, which is not installed"):
-        checking.text(case('name = "constant"', rest='[parallel]\nexecutor = "dask"'), "case.toml")
+        check.text(case('name = "constant"', rest='[parallel]\nexecutor = "dask"'), "case.toml")

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from smolux.core.rng import bits, streams
+from smolux.core.rng import bits
+from smolux.core.seeds import streams
 from smolux.methods.size_class import alias
 
 

@@ -10,7 +10,7 @@ from tests.shared import FORMULA, QUICK, extinction
 import smolux as sx
 from smolux import case as cases
 from smolux.analysis.reference import model_of
-from smolux.cli.estimate import negative_rates
+from smolux.cli.cautions import negative_rates
 from smolux.deterministic.steady import steady_state
 from smolux.errors import InputError
 from smolux.exact import finite

@@ -17,6 +17,7 @@ import smolux as sx
 from shared import QUICK, extinction
 from smolux.errors import InputError
 from smolux.stochastic.assembly import rates_for
+from smolux.stochastic.planning import make_plan
 
 METHODS = [method.name for method in sx.methods.METHODS]
 #: the law of `MassFlow`, which is compiled without a power; see `test_processes`
@@ -319,7 +320,7 @@ def test_choice_of_a_method() -> None:
     """The estimate of the cost is that of the weighted rates."""
     model = sx.Model(sx.kernels.Constant(), initial=sx.initial.monodisperse(2.0))
     found = {
-        name: sx.planning.make_plan(
+        name: make_plan(
             model,
             [20.0],
             method="auto",

@@ -13,7 +13,7 @@ import pytest
 import smolux as sx
 from shared import FORMULA
 from smolux import case as cases
-from smolux.cli import running
+from smolux.cli.commands import run as command
 from smolux.errors import InputError
 from smolux.settings.target_error import Goal
 from smolux.stochastic import checkpoint, planning
@@ -151,10 +151,10 @@ def test_a_begun_run_is_known_by_what_was_asked_for(monkeypatch: pytest.MonkeyPa
         case = cases.parse(text + asked)
         assert case.run is not None
         begun = make_plan(case.model, **case.run.arguments())
-        running._check_plan(begun, case)
+        command._check_plan(begun, case)
         other = cases.parse(text + '"number"')
         with pytest.raises(InputError, match="was changed"):
-            running._check_plan(begun, other)
+            command._check_plan(begun, other)
 
 
 def test_the_method_is_chosen_for_the_weighting() -> None:

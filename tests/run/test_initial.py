@@ -12,7 +12,7 @@ from scipy import stats
 import smolux as sx
 from shared import QUICK
 from smolux.case import parse
-from smolux.cli.estimate import physics_warnings
+from smolux.cli.cautions import physics_warnings
 from smolux.initial import base
 from smolux.stochastic.replicas import initial_populations
 

@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 import smolux as sx
-from smolux.core import rng, splits
+from smolux.core import seeds, splits
 from smolux.core.slots import slot_edges
 from smolux.core.state import LONE_BITS, State, new_state
 from smolux.functions.user_function import Function
@@ -96,7 +96,7 @@ def test_splits_are_drawn_by_their_rates(size: int, p: float) -> None:
         low, high = EDGES[sizes], EDGES[1:][sizes] - 1.0
         splits.fill(known, sizes, *process.split_bounds(low, high, process.pairs.bounds))
         assert not known.narrow.any()
-    states = new_state(rng.streams(1, 0, 1), 1, 2, 1)
+    states = new_state(seeds.streams(1, 0, 1), 1, 2, 1)
     found, n = np.zeros(size // 2 + 1, np.int64), 40_000
     total = _drawn(State(*(a[0] for a in states)), (process.parameters, known), size, n, found)
     i = np.arange(1.0, size // 2 + 1)

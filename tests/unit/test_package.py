@@ -42,6 +42,21 @@ def test_physics_is_described_without_numba():
     assert loaded_after(code) <= {"scipy"}
 
 
+def test_a_case_that_names_a_method_is_read_without_numba():
+    code = (
+        "from smolux.case import parse\n"
+        'text = \'[kernel]\\nname = "constant"\\n[run]\\ntimes = [1]\\nmethod = "inverse"\'\n'
+        "assert parse(text).run.method == 'inverse'"
+    )
+    assert loaded_after(code) == set()
+
+
+@pytest.mark.parametrize("package", ["smolux.methods", "smolux.spatial.methods"])
+def test_methods_have_the_names_of_their_table(package):
+    methods = importlib.import_module(package)
+    assert [m.name for m in methods.METHODS] == list(methods.NAMES)
+
+
 def test_loops_load_no_linear_algebra_but_have_it_when_asked():
     code = (
         "import sys, numpy as np\n"

@@ -77,6 +77,10 @@ class Flight:
         radii = spatial.lognormal_radii(self.radius_sigma) if self.radius_sigma > 1 else None
         return spatial.random(self.discs, self.volume_fraction, radii=radii, **common)
 
+    def settings(self) -> dict[str, Any]:
+        """Arguments of `smolux.spatial.simulate` beside system and method."""
+        return {name: getattr(self, name) for name in _RUN}
+
     def arguments(self) -> dict[str, Any]:
         """Arguments of `smolux.spatial.simulate` beside the system."""
         from smolux.spatial.methods import METHODS
@@ -84,7 +88,7 @@ class Flight:
         given = {name: getattr(self, name) for name in _STEPPING}
         settings = {name: value for name, value in given.items() if value is not None}
         method = next(m for m in METHODS if m.name == self.method)(**settings)
-        return {"method": method} | {name: getattr(self, name) for name in _RUN}
+        return {"method": method} | self.settings()
 
 
 @dataclass(frozen=True)
@@ -156,7 +160,7 @@ def load(path: str | os.PathLike[str], sets: Sequence[str] = ()) -> SpatialCase 
 
 
 def _read_flight(content: Any, problems: Problems) -> Flight | None:
-    from smolux.spatial.methods import METHODS
+    from smolux.spatial.methods import NAMES
 
     table = Table(content, ("spatial",), problems)
     if "discs" not in table:
@@ -171,7 +175,7 @@ def _read_flight(content: Any, problems: Problems) -> Flight | None:
         "temperature": table.number("temperature", Flight.temperature, above=0.0),
         "radius_sigma": table.number("radius_sigma", Flight.radius_sigma, 1.0),
         "seed": table.integer("seed", None, 0),
-        "method": table.choice("method", Flight.method, [m.name for m in METHODS]),
+        "method": table.choice("method", Flight.method, list(NAMES)),
         "step": table.number("step", None, above=0.0),
         "rigid": table.flag("rigid", False) if "rigid" in table else None,
     }

@@ -1,13 +1,46 @@
-"""The commands, put together."""
+"""The commands, put together: each is loaded when it is used."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
 
-from . import check, compare, demo, efficiency, kernels, movie, new, plot, run, show, sweep, verify
-from .guard import Commands
+from .guard import Guarded
+
+#: each is the function of that name in the module of that name in `smolux.cli.commands`
+COMMANDS = {
+    "demo": "Simulate a case whose exact solution is known.",
+    "new": "Write a commented case file from a template.",
+    "check": "Check a case: mistakes, gelation, memory; what it will cost.",
+    "run": "Run a case: results, figures and a report in a folder.",
+    "sweep": "Run a case at every point of a grid; all results in one file.",
+    "show": "Show the summary of a result.",
+    "plot": "Draw figures of a result.",
+    "movie": "Make a movie of a run in space.",
+    "compare": "Run a case by every method and the solver.",
+    "efficiency": "Measure bias, variance, cost and efficiency.",
+    "kernels": "List the collision kernels, or show one.",
+    "verify": "Test every method against the exact laws.",
+}
+
+
+class Commands(Guarded):
+    """The commands of the table, of which the one that is called takes the place of its entry."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Load the command that is called."""
+        if args and args[0] in COMMANDS:
+            self.commands[args[0]] = _loaded(args[0])
+        return super().resolve_command(ctx, args)
+
+
+def _loaded(name: str) -> Any:
+    alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+    alone.command(name)(getattr(import_module(f"smolux.cli.commands.{name}"), name))
+    return typer.main.get_command(alone)
+
 
 app = typer.Typer(
     cls=Commands,
@@ -46,15 +79,9 @@ def smolux(
     context.obj = {"debug": debug}
 
 
-app.command()(demo.demo)
-app.command()(new.new)
-app.command()(check.check)
-app.command()(run.run)
-app.command()(sweep.sweep)
-app.command()(show.show)
-app.command()(plot.plot)
-app.command()(movie.movie)
-app.command()(compare.compare)
-app.command()(efficiency.efficiency)
-app.command()(kernels.kernels)
-app.command()(verify.verify)
+def _entry() -> None:
+    """Stand for a command in the list of all."""
+
+
+for _name, _summary in COMMANDS.items():
+    app.command(_name, help=_summary)(_entry)

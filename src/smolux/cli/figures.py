@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from smolux import plotting
+import smolux
+from smolux.case.settings import FIGURES
 from smolux.errors import InputError, did_you_mean
 
-#: name -> function of a result and of what it is compared with
-KINDS: dict[str, Callable[..., Any]] = {
-    "clusters": plotting.clusters,
-    "moments": plotting.moments,
-    "size-distribution": plotting.size_distribution,
-    "oscillations": plotting.oscillations,
-    "scaling": plotting.scaling,
-}
 #: those that know the exact solution themselves
 _KNOWING = ("clusters", "moments", "size-distribution")
 _DPI = 200
@@ -28,7 +21,7 @@ def draw(name: str, ds: Any, solution: Any = None) -> Any:
     Parameters
     ----------
     name : str
-        Of `KINDS`.
+        As case files have it; the function of `smolux.plotting` has an underscore for a dash.
     ds : xarray.Dataset
         A result.
     solution : xarray.Dataset, optional
@@ -39,14 +32,13 @@ def draw(name: str, ds: Any, solution: Any = None) -> Any:
     InputError
         If there is no such kind of figure, or the result holds nothing to draw.
     """
-    if name not in KINDS:
-        raise InputError(f"--kind {name}: no such figure{did_you_mean(name, list(KINDS))}")
+    if name not in FIGURES:
+        raise InputError(f"--kind {name}: no such figure{did_you_mean(name, FIGURES)}")
     reference = solution
     if name in _KNOWING:
-        from smolux.analysis import exact_dataset
-
-        reference = "exact" if solution is None or exact_dataset(ds) is not None else solution
-    return KINDS[name](ds, reference=reference)
+        exact = smolux.analysis.exact_dataset
+        reference = "exact" if solution is None or exact(ds) is not None else solution
+    return getattr(smolux.plotting, name.replace("-", "_"))(ds, reference=reference)
 
 
 def write(
@@ -68,5 +60,5 @@ def write(
         except InputError as error:
             remarks.append(f"no figure {name!r}: {error}")
             continue
-        files.append(plotting.save(figure, folder / f"{name}.png", dpi=_DPI))
+        files.append(smolux.plotting.save(figure, folder / f"{name}.png", dpi=_DPI))
     return files, remarks

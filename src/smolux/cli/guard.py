@@ -20,7 +20,7 @@ OURS, YOURS, RESUMABLE = 1, 2, 3
 _CTRL_C = 130
 
 
-class Commands(TyperGroup):
+class Guarded(TyperGroup):
     """The commands, with the exit codes of smolux."""
 
     def invoke(self, ctx: Any) -> Any:

@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import smolux
-from smolux import analysis
 from smolux.case import Case
-from smolux.results import warnings
 from smolux.runtime.files import replacing
 
-from . import showing
+from .commands import show
 from .console import amount, duration
 
 _STYLE = """
@@ -76,7 +74,7 @@ def write(
 def page(case: Case, ds: Any, solution: Any = None, figures: Sequence[Path] = ()) -> str:
     """Return the report as HTML; it loads nothing from anywhere."""
     title = case.title or f"{case.model.kernel.name} kernel"
-    found = list(dict.fromkeys([*warnings(ds), *_of(solution)]))
+    found = list(dict.fromkeys([*smolux.results.warnings(ds), *_of(solution)]))
     parts = [
         f"<h1>{escape(title)}</h1>",
         f'<p class="dim">{escape(_subtitle(ds))}</p>',
@@ -103,7 +101,7 @@ def page(case: Case, ds: Any, solution: Any = None, figures: Sequence[Path] = ()
 
 
 def _of(ds: Any) -> list[str]:
-    return [] if ds is None else warnings(ds)
+    return [] if ds is None else smolux.results.warnings(ds)
 
 
 def _subtitle(ds: Any) -> str:
@@ -130,11 +128,11 @@ def _table(caption: str, header: Iterable[str], rows: Iterable[Iterable[str]]) -
 
 
 def _summary(ds: Any) -> list[str]:
-    summary = showing.chosen(ds, showing.MOST)
-    tables = [_table(title, rows[0], rows[1:]) for title, rows in analysis.tables(summary)]
+    summary = show.chosen(ds, show.MOST)
+    tables = [_table(title, rows[0], rows[1:]) for title, rows in smolux.analysis.tables(summary)]
     notes = (
         str(summary.attrs["mass"]),
-        showing.shown(ds, showing.MOST),
+        show.shown(ds, show.MOST),
         str(summary.attrs.get("notes", "")),
     )
     words = escape(" ".join(note for note in notes if note))
@@ -150,7 +148,7 @@ def _agreement(ds: Any, solution: Any) -> list[str]:
 
 def agreement(ds: Any, solution: Any) -> str:
     """Say in a sentence whether a result and a solution of the rate equations agree."""
-    found = analysis.compare(ds, solution).attrs
+    found = smolux.analysis.compare(ds, solution).attrs
     if not found["entries"]:
         return "Nothing could be tested against the solution of the rate equations."
     words = {1: "agrees with", 0: "differs from"}.get(found["agree"], "cannot be told from")

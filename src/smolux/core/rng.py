@@ -14,27 +14,12 @@ import numpy as np
 
 from smolux.jit.compile import cold_piece, piece
 
-from .seeds import spawned
-
 _R17, _R23, _R45 = np.uint64(17), np.uint64(23), np.uint64(45)
 _R19, _R41 = np.uint64(19), np.uint64(41)
 _S11 = np.uint64(11)
 _TO_UNIT = 2.0**-53
 _LAYER = np.uint64(255)
 _ONE = np.uint64(1)
-
-
-def streams(entropy: int, first: int, count: int) -> np.ndarray:
-    """Seed the streams of the replicas from `first` on: a uint64 array of shape (count, 4).
-
-    The words are those of ``numpy.random.SeedSequence(entropy).spawn(...)[replica]``.
-    """
-    return spawned(entropy, np.arange(first, first + count))
-
-
-def stream(entropy: int, *key: int) -> np.ndarray:
-    """Seed a stream that is told from others by its key."""
-    return np.random.SeedSequence(entropy, spawn_key=key).generate_state(4, np.uint64)
 
 
 @piece

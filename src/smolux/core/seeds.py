@@ -70,3 +70,16 @@ def spawned(entropy: int, children: NDArray[np.int64]) -> NDArray[np.uint64]:
     constants = _constants(_INIT_B, _MULT_B)
     state = np.stack([_hashed(pool[k % _POOL], constants) for k in range(2 * _POOL)], axis=-1)
     return np.ascontiguousarray(state).astype("<u4").view("<u8").astype(np.uint64)
+
+
+def streams(entropy: int, first: int, count: int) -> np.ndarray:
+    """Seed the streams of the replicas from `first` on: a uint64 array of shape (count, 4).
+
+    The words are those of ``numpy.random.SeedSequence(entropy).spawn(...)[replica]``.
+    """
+    return spawned(entropy, np.arange(first, first + count))
+
+
+def stream(entropy: int, *key: int) -> np.ndarray:
+    """Seed a stream that is told from others by its key."""
+    return np.random.SeedSequence(entropy, spawn_key=key).generate_state(4, np.uint64)

@@ -1,9 +1,9 @@
 """The same model by rate equations: `solve`, steady states and their stability."""
 
+from smolux.errors import SolverError
 from smolux.runtime.progress import Progress
 
 from .hopf import HopfThreshold, hopf_threshold
-from .integrate import SolverError
 from .solver import solve
 from .steady import SteadyState, eigenvalues, steady_state
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from smolux.errors import InputError
+from smolux.errors import InputError, SolverError
 from smolux.initial import monodisperse
 from smolux.kernels.base import Kernel
 from smolux.model import Model
 from smolux.processes import Aggregation, Shattering
 
-from .integrate import SolverError
 from .steady import SteadyState, eigenvalues, linearisation, steady_state
 
 Complex = NDArray[np.complex128]

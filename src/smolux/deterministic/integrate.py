@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from smolux.errors import SolverError
+
 from .account import Account, Entry
 from .equations import Equations
 from .radau import ESTIMATE_POWER, STAGES, STEP_POWER, TABLEAU, Step, extrapolate, radau_step
@@ -34,24 +36,6 @@ _NOTHING = 1e-100
 _PREPARE = 8
 #: no moment is smaller
 _LEAST = float(np.finfo(float).tiny)
-
-
-class SolverError(RuntimeError):
-    """The rate equations could not be solved any further.
-
-    Attributes
-    ----------
-    time : float
-        How far the solution came.
-    dataset : xarray.Dataset or None
-        What was computed; output times not reached are NaN.
-    """
-
-    dataset: object = None
-
-    def __init__(self, message: str, time: float) -> None:
-        super().__init__(message)
-        self.time = time
 
 
 class Norm:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.errors import InputError, Interrupted
+from smolux.errors import InputError, Interrupted, SolverError
 from smolux.functions.content import frozen
 from smolux.model import Model
 from smolux.processes import Source
@@ -22,7 +22,7 @@ from .arguments import renamed
 from .encounters import Encounters
 from .equations import Equations
 from .gel import may_gel
-from .integrate import Integrator, SolverError
+from .integrate import Integrator
 from .observe import Observer, Snapshot
 from .terms import unit_of
 from .timemesh import TimeMesh

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import linalg as krylov
 
-from smolux.errors import InputError
+from smolux.errors import InputError, SolverError
 from smolux.functions.content import frozen
 from smolux.model import Model
 from smolux.runtime.progress import Progress
@@ -18,7 +18,6 @@ from smolux.runtime.progress import Progress
 from .arguments import renamed
 from .encounters import Encounters
 from .equations import Equations
-from .integrate import SolverError
 from .linearisation import Linearisation
 from .window import Window
 

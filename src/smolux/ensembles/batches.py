@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from smolux.checks import whole
-from smolux.core.rng import streams
+from smolux.core.seeds import streams
 from smolux.core.state import BUDGET, DONE, State
 from smolux.functions.content import frozen
 from smolux.initial import Sizes

@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from smolux import exact as solutions
 from smolux.confidence import quantile
-from smolux.deterministic import SolverError
 from smolux.deterministic.solver import solve
-from smolux.errors import InputError
+from smolux.errors import InputError, SolverError
 from smolux.methods.base import Method
 from smolux.model import Model
 from smolux.results import provenance, told

@@ -193,3 +193,17 @@ class RatedBySize(Varying):
     def parameters(self) -> tuple[Any, ...]:
         """See `LoneProcess.parameters`."""
         return self.of_size.arguments
+
+
+def factors_of(process: Process, kernel: Kernel | None) -> list[TimeFunction]:
+    """Return what multiplies the rate of a process in time: for each term of a kernel that varies.
+
+    The first is that of the process alone where nothing else does.
+    """
+    terms = kernel.in_time if kernel is not None and isinstance(process, PairProcess) else ()
+    return [process.factor * factor for factor, _ in terms] or [process.factor]
+
+
+def text_of(process: Process, kernel: Kernel) -> str:
+    """Return what multiplies the rate of a process in time, for messages."""
+    return " and ".join(factor.text for factor in factors_of(process, kernel))

@@ -110,16 +110,18 @@ class Text(Kind):
 class Registered(Kind):
     """The name of an entry of a registry, ``"auto"``, or an object with settings of its own.
 
-    It is kept as it was given. The registry is looked at when it is needed: methods load Numba.
+    It is kept as it was given. The registry is looked at when it is needed, and its entries when
+    one of them is: methods load Numba.
 
     Parameters
     ----------
-    module, registry, base : str
-        Where the registry is, and its name and that of the class of its entries there.
+    module, registry, names, base : str
+        Where the registry is, and what it, the names of its entries and the class of these are
+        called there.
     """
 
-    def __init__(self, module: str, registry: str, base: str) -> None:
-        self.module, self.registry, self.base = module, registry, base
+    def __init__(self, module: str, registry: str, names: str, base: str) -> None:
+        self.module, self.registry, self.names, self.base = module, registry, names, base
 
     def _entries(self) -> dict[str, Any]:
         return {e.name: e for e in getattr(import_module(self.module), self.registry)}
@@ -127,7 +129,7 @@ class Registered(Kind):
     @property
     def words(self) -> list[str]:
         """Names that may be given."""
-        return [*self._entries(), "auto"]
+        return [*getattr(import_module(self.module), self.names), "auto"]
 
     def check(self, key: str, value: Any) -> Any:
         """See `Kind`."""

@@ -24,8 +24,8 @@ LEAST = 1000
 #: densities that are given size by size at most; there are bins above
 MOST_SIZES = 100_000_000
 
-METHOD = Registered("smolux.methods", "METHODS", "Method")
-WEIGHTING = Registered("smolux.weighting", "WEIGHTINGS", "Weighting")
+METHOD = Registered("smolux.methods", "METHODS", "NAMES", "Method")
+WEIGHTING = Registered("smolux.weighting", "WEIGHTINGS", "NAMES", "Weighting")
 
 
 @dataclass(frozen=True)

@@ -2,42 +2,45 @@
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-#: public name -> module that defines it
-_LAZY = {
-    "METHODS": "methods",
-    "AllPairs": "methods.direct",
-    "Box": "box",
-    "Cells": "methods.direct",
-    "Contacts": "analysis.morphology",
-    "Dimension": "analysis.dimensions",
-    "Snapshot": "analysis.morphology",
-    "SpatialProgress": "simulation",
-    "System": "system",
-    "TimeStepping": "methods.time_stepping",
-    "Windowed": "methods.windowed",
-    "bimodal_radii": "initial",
-    "box_dimension": "analysis.dimensions",
-    "contacts": "analysis.morphology",
-    "lattice": "initial",
-    "log_of": "results.result",
-    "lognormal_radii": "initial",
-    "mass_dimension": "analysis.dimensions",
-    "mean_field_model": "analysis.kernel",
-    "measured_kernel": "analysis.kernel",
-    "pair_distribution": "analysis.correlations",
-    "random": "initial",
-    "replay": "results.result",
-    "resume": "resuming",
-    "shapes": "analysis.morphology",
-    "simulate": "simulation",
-    "snapshot": "analysis.morphology",
-    "structure_factor": "analysis.correlations",
-    "system_of": "results.result",
-    "write_trajectory": "results.trajectory",
-}
+from smolux.runtime.lazy import lazily
+
+__getattr__, __dir__ = lazily(
+    __name__,
+    {
+        "METHODS": "methods",
+        "AllPairs": "methods.direct",
+        "Box": "box",
+        "Cells": "methods.direct",
+        "Contacts": "analysis.morphology",
+        "Dimension": "analysis.dimensions",
+        "Snapshot": "analysis.morphology",
+        "SpatialProgress": "simulation",
+        "System": "system",
+        "TimeStepping": "methods.time_stepping",
+        "Windowed": "methods.windowed",
+        "bimodal_radii": "initial",
+        "box_dimension": "analysis.dimensions",
+        "contacts": "analysis.morphology",
+        "lattice": "initial",
+        "log_of": "results.result",
+        "lognormal_radii": "initial",
+        "mass_dimension": "analysis.dimensions",
+        "mean_field_model": "analysis.kernel",
+        "measured_kernel": "analysis.kernel",
+        "pair_distribution": "analysis.correlations",
+        "random": "initial",
+        "replay": "results.result",
+        "resume": "resuming",
+        "shapes": "analysis.morphology",
+        "simulate": "simulation",
+        "snapshot": "analysis.morphology",
+        "structure_factor": "analysis.correlations",
+        "system_of": "results.result",
+        "write_trajectory": "results.trajectory",
+    },
+)
 
 __all__ = [
     "METHODS",
@@ -88,16 +91,3 @@ if TYPE_CHECKING:
     from .resuming import resume
     from .simulation import SpatialProgress, simulate
     from .system import System
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _LAZY:
-        raise AttributeError(f"module 'smolux.spatial' has no attribute {name!r}")
-    module = importlib.import_module(f"smolux.spatial.{_LAZY[name]}")
-    value = getattr(module, name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return __all__

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.core.rng import streams
+from smolux.core.seeds import streams
 from smolux.errors import InputError, did_you_mean
 
 from .analysis.overlaps import placed_at_random

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smolux.core.rng import streams
+from smolux.core.seeds import streams
 from smolux.core.state import (
     BAD_FACTOR,
     BAD_RATE,
@@ -55,13 +55,12 @@ from smolux.kernels.base import Kernel
 from smolux.kernels.shared import WHOLE, Shared
 from smolux.methods.base import size_of
 from smolux.model import Model
-from smolux.processes.base import LoneProcess, PairProcess
+from smolux.processes.base import LoneProcess, PairProcess, text_of
 from smolux.runtime import room
 
 from .assembly import bound_splits, factor_parameters, uncompilable
 from .plan import Plan
 from .remembered import spent
-from .windows import text_of
 
 Int = NDArray[np.int64]
 

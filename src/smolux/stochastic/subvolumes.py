@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from smolux.core.rng import stream
+from smolux.core.seeds import stream
 from smolux.core.state import (
     BUDGET,
     CLOCKS,

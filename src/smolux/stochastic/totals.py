@@ -24,12 +24,11 @@ from smolux.core.state import (
     WORST_I,
     WORST_J,
 )
-from smolux.processes.base import LoneProcess, PairProcess
+from smolux.processes.base import LoneProcess, PairProcess, text_of
 
 from .plan import Plan
 from .replicas import Group
 from .subvolumes import Divided
-from .windows import text_of
 
 Float = NDArray[np.float64]
 

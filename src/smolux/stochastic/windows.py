@@ -14,7 +14,7 @@ from smolux.functions.time import TimeFunction
 from smolux.functions.user_function import golden
 from smolux.kernels.base import Kernel
 from smolux.processes import Removal, Source
-from smolux.processes.base import PairProcess, Process
+from smolux.processes.base import PairProcess, Process, factors_of
 from smolux.weighting import Number
 from smolux.weighting.base import Weighting
 
@@ -61,20 +61,6 @@ def _glimpse(factor: TimeFunction, start: float, end: float) -> float:
     except Exception:  # what a function does there is not held against it
         return 0.0
     return bound if np.isfinite(bound) else 0.0
-
-
-def factors_of(process: Process, kernel: Kernel | None) -> list[TimeFunction]:
-    """Return what multiplies the rate of a process in time: for each term of a kernel that varies.
-
-    The first is that of the process alone where nothing else does.
-    """
-    terms = kernel.in_time if kernel is not None and isinstance(process, PairProcess) else ()
-    return [process.factor * factor for factor, _ in terms] or [process.factor]
-
-
-def text_of(process: Process, kernel: Kernel) -> str:
-    """Return what multiplies the rate of a process in time, for messages."""
-    return " and ".join(factor.text for factor in factors_of(process, kernel))
 
 
 @timed

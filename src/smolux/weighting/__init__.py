@@ -7,5 +7,7 @@ from .weight_function import WeightFunction
 
 #: every weighting
 WEIGHTINGS: tuple[type[Weighting], ...] = (Number, MassFlow, WeightFunction)
+#: their names
+NAMES = tuple(weighting.name for weighting in WEIGHTINGS)
 
-__all__ = ["WEIGHTINGS", "MassFlow", "Number", "WeightFunction", "Weighting"]
+__all__ = ["NAMES", "WEIGHTINGS", "MassFlow", "Number", "WeightFunction", "Weighting"]

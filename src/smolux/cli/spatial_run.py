@@ -10,17 +10,17 @@ from typing import Any
 
 import typer
 
-from smolux import plotting, results, spatial
+import smolux
 from smolux.case import spatial as cases
 from smolux.case.spatial import FIGURES, SpatialCase
 from smolux.errors import InputError, Interrupted, did_you_mean, quiet
 from smolux.runtime.stopping import ALL, Stopper
-from smolux.spatial.simulation import checked
+from smolux.settings import SpatialSettings
 
-from . import rundir
+from . import run_directory
 from .console import amount, duration, say
 from .progress import Display
-from .rundir import RunDirectory
+from .run_directory import RunDirectory
 
 _DPI = 200
 
@@ -37,10 +37,10 @@ def run(case: SpatialCase, path: Path, output: Path | None) -> None:
         The folder that is wanted.
     """
     if path.is_dir():
-        directory = rundir.find(path)
+        directory = run_directory.find(path)
     else:
         case = case.with_seed()
-        directory = rundir.create(case, path, output)
+        directory = run_directory.create(case, path, output)
     say(f"seed {case.run.seed}, folder {directory.path}")
     tree = _stored(directory, case)
     if tree is None or _cut(tree):
@@ -55,7 +55,7 @@ def _stored(directory: RunDirectory, case: SpatialCase) -> Any:
     """Load what a run has reached; None if there is nothing."""
     if not directory.results.is_file():
         return None
-    tree = results.load(directory.results)
+    tree = smolux.results.load(directory.results)
     begun = tree.attrs.get("case", "")
     if begun != case.to_toml():
         raise InputError(
@@ -70,10 +70,10 @@ def _simulate(case: SpatialCase, directory: RunDirectory, before: Any) -> Any:
     exact = arguments["method"].exact
     tree: Any
     if before is None or not exact:
-        begun = partial(spatial.simulate, case.run.system())
+        begun = partial(smolux.spatial.simulate, case.run.system())
     else:
         say(f"going on at t = {before.attrs['time_reached']:.6g}")
-        begun = partial(spatial.resume, before)
+        begun = partial(smolux.spatial.resume, before)
         del arguments["method"]
     with Stopper(ALL, say=say) as stopper, Display(stopper.check) as progress, quiet():
         try:
@@ -102,7 +102,7 @@ def _store(tree: Any, case: SpatialCase, directory: RunDirectory) -> None:
     tree.attrs["case"] = case.to_toml()
     if case.title:
         tree.attrs["title"] = case.title
-    results.save(tree, directory.results)
+    smolux.results.save(tree, directory.results)
 
 
 def _write_output(case: SpatialCase, tree: Any, folder: Path) -> list[str]:
@@ -113,10 +113,11 @@ def _write_output(case: SpatialCase, tree: Any, folder: Path) -> list[str]:
     ]
     if wanted.trajectory != "none":
         file = folder / f"trajectory.{wanted.trajectory}"
-        jobs.append((file.name, lambda: spatial.write_trajectory(tree, file, frames=wanted.frames)))
+        write = partial(smolux.spatial.write_trajectory, tree, file, frames=wanted.frames)
+        jobs.append((file.name, write))
     if wanted.movie:
         film = folder / "movie.gif"
-        jobs.append((film.name, lambda: plotting.movie(tree, film, frames=wanted.frames)))
+        jobs.append((film.name, partial(smolux.plotting.movie, tree, film, frames=wanted.frames)))
     remarks = []
     for name, job in jobs:
         try:
@@ -127,7 +128,7 @@ def _write_output(case: SpatialCase, tree: Any, folder: Path) -> list[str]:
 
 
 def _save(name: str, tree: Any, folder: Path) -> Path:
-    return plotting.save(draw(name, tree), folder / f"{name}.png", dpi=_DPI)
+    return smolux.plotting.save(draw(name, tree), folder / f"{name}.png", dpi=_DPI)
 
 
 def draw(name: str, tree: Any) -> Any:
@@ -145,13 +146,14 @@ def draw(name: str, tree: Any) -> Any:
     InputError
         If there is no such kind of figure, or the result holds nothing to draw.
     """
+    figure, measured = smolux.plotting, smolux.spatial
     kinds: dict[str, Callable[[Any], Any]] = {
-        "discs": plotting.discs,
-        "coarsening": plotting.coarsening,
-        "spatial-kernel": lambda t: plotting.spatial_kernel(spatial.measured_kernel(t)),
-        "pair-distribution": lambda t: plotting.pair_distribution(spatial.pair_distribution(t)),
-        "box-dimension": lambda t: plotting.dimension(spatial.box_dimension(t)),
-        "mass-dimension": lambda t: plotting.dimension(spatial.mass_dimension(t)),
+        "discs": figure.discs,
+        "coarsening": figure.coarsening,
+        "spatial-kernel": lambda t: figure.spatial_kernel(measured.measured_kernel(t)),
+        "pair-distribution": lambda t: figure.pair_distribution(measured.pair_distribution(t)),
+        "box-dimension": lambda t: figure.dimension(measured.box_dimension(t)),
+        "mass-dimension": lambda t: figure.dimension(measured.mass_dimension(t)),
     }
     if name not in kinds:
         raise InputError(f"--kind {name}: no such figure{did_you_mean(name, FIGURES)}")
@@ -183,7 +185,7 @@ def text(tree: Any) -> str:
     merges, walls = tree["events"].sizes["event"], tree["walls"].sizes["reflection"]
     walls += int(tree["walls"]["more"].sum()) if "more" in tree["walls"] else 0
     lines += ["", f"{merges} merges and {walls} reflections until t = {a['time_reached']:.6g}."]
-    lines += [f"warning: {w}" for w in results.warnings(tree)]
+    lines += [f"warning: {w}" for w in smolux.results.warnings(tree)]
     return "\n".join(lines).strip()
 
 
@@ -196,8 +198,7 @@ def described(case: cases.SpatialCase, source: str) -> str:
         If they do not, or for what a run would refuse.
     """
     system = case.with_seed().run.system()
-    given = case.run.arguments()
-    checked(system, given.pop("method"), given)
+    SpatialSettings.checked(case.run.settings())
     run_ = case.run
     memory = 450 * len(system)
     lines = [

@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+import smolux
+from smolux.cli.run_directory import find_results, load_results
+
 
 def movie(
     path: Annotated[Path, typer.Argument(help="The folder of a run in space, or its results.")],
@@ -18,10 +21,6 @@ def movie(
     pixels: Annotated[int, typer.Option("--pixels", "-p", help="Width; even.")] = 480,
 ) -> None:
     """Make a movie of a run in space: GIF, or MP4 with the extra "movie"."""
-    from smolux import plotting
-
-    from . import showing
-
-    file = output or showing.find(path).parent / "movie.gif"
-    tree = showing.load(path)
-    typer.echo(plotting.movie(tree, file, frames=frames, rate=rate, pixels=pixels))
+    file = output or find_results(path).parent / "movie.gif"
+    tree = load_results(path)
+    typer.echo(smolux.plotting.movie(tree, file, frames=frames, rate=rate, pixels=pixels))

@@ -1,4 +1,4 @@
-"""Running a case in its folder, from wherever it stands: the same for a new run and an old one."""
+"""``smolux run``: a case in its folder, from wherever it stands, a new run and an old one alike."""
 
 from __future__ import annotations
 
@@ -11,25 +11,24 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 import smolux
-from smolux import results
-from smolux.case import Case, parse
-from smolux.deterministic import SolverError
-from smolux.deterministic.solver import solve
-from smolux.errors import InputError, Interrupted, OutOfMemoryError, WorkerError, quiet
+from smolux.case import Case, load, parse, spatial
+from smolux.cli import figures, report, run_directory, spatial_run
+from smolux.cli.commands import show
+from smolux.cli.console import duration, say
+from smolux.cli.options import Overrides
+from smolux.cli.progress import Display
+from smolux.cli.run_directory import RunDirectory
+from smolux.errors import InputError, Interrupted, OutOfMemoryError, SolverError, WorkerError, quiet
 from smolux.model_dict import model_to_dict
 from smolux.observables import units
 from smolux.runtime.executors import opened
 from smolux.runtime.stopping import ALL, Stopper
 from smolux.settings import Settings
-from smolux.stochastic import checkpoint as checkpoints
-
-from . import figures, report
-from .console import duration, say
-from .progress import Display
-from .rundir import RunDirectory
 
 
 @dataclass
@@ -92,7 +91,7 @@ def _onward(directory: RunDirectory) -> str:
     kept = directory.checkpoint.is_file()
     if not kept and directory.results.is_file():
         with suppress(InputError):  # what is whole is not computed again
-            kept = bool(results.load(directory.results).attrs.get("complete", 1))
+            kept = bool(smolux.results.load(directory.results).attrs.get("complete", 1))
     return f"{'go on' if kept else 'begin again'} with: smolux run {directory.path}"
 
 
@@ -132,11 +131,11 @@ def _finished(file: Path, case: Case, checkpoint: Path | None = None) -> Any:
         If they are those of another case.
     """
     if checkpoint is not None and checkpoint.is_file():
-        _check_plan(checkpoints.load(checkpoint)[0], case)
+        _check_plan(_plan_of(checkpoint), case)
         return None
     if not file.is_file():
         return None
-    ds = results.load(file)
+    ds = smolux.results.load(file)
     if not ds.attrs.get("complete", 1):
         return None
     begun = parse(str(ds.attrs["case"])) if "case" in ds.attrs else case
@@ -157,6 +156,12 @@ def _data(case: Case, settings: str) -> dict[str, Any]:
     if settings == "solve" and case.solve is not None:
         return case.solve.arguments()
     return {} if case.run is None else case.run.arguments()
+
+
+def _plan_of(checkpoint: Path) -> Any:
+    from smolux.stochastic.checkpoint import load as stored  # which loads Numba
+
+    return stored(checkpoint)[0]
 
 
 def _check_plan(plan: Any, case: Case) -> None:
@@ -233,7 +238,7 @@ def _computed(case: Case, directory: RunDirectory, progress: Display) -> Any:
 def _solve(case: Case, file: Path, display: Callable[..., Display]) -> Any:
     settings = case.solve_arguments()
     with display(first="solving") as progress:
-        ds = _stored(partial(solve, case.model, **settings, progress=progress), case, file)
+        ds = _stored(partial(smolux.solve, case.model, **settings, progress=progress), case, file)
     say(f"solved in {duration(float(ds.attrs['wall_seconds']))}")
     return ds
 
@@ -270,10 +275,53 @@ def _store(ds: Any, case: Case, file: Path) -> None:
             if "units" in ds.get(name, ds).attrs:
                 ds[name].attrs["units"] = unit
     try:
-        results.save(ds, file)
+        smolux.results.save(ds, file)
     except OSError:
         handle, name = tempfile.mkstemp(prefix=f"smolux-{file.stem}-", suffix=".nc")
         os.close(handle)
-        results.save(ds, name)  # if that fails too, the first error is told with it
+        smolux.results.save(ds, name)  # if that fails too, the first error is told with it
         say(f"{file} cannot be written; what was computed is in {name}")
         raise
+
+
+def run(
+    case: Annotated[Path, typer.Argument(help="A case file, or the folder of an unfinished run.")],
+    overrides: Overrides = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder of the run; the name of the case if left out."),
+    ] = None,
+) -> None:
+    """Run a case: results, figures and a report in a folder.
+
+    Ctrl-C, SIGTERM or the time limit stop it without loss; "smolux run FOLDER" goes on from there,
+    and the data are bit for bit those of a run without a stop.
+    """
+    in_space = spatial.load(case / "case.toml" if case.is_dir() else case, overrides or ())
+    if in_space is not None:
+        spatial_run.run(in_space, case, output)
+        return
+    if case.is_dir():
+        if overrides or output is not None:
+            raise InputError(
+                f"{case}: is a run that was begun: it goes on as it is, without --set and -o"
+            )
+        directory = run_directory.find(case)
+    else:
+        directory = run_directory.create(load(case, overrides or ()).with_seed(), case, output)
+    settings = directory.load()
+    seed = f"seed {settings.run.seed}, " if settings.run is not None else ""
+    say(f"{seed}folder {directory.path}")
+    _tell(proceed(directory), directory)
+
+
+def _tell(outcome: Outcome, directory: RunDirectory) -> None:
+    """Print what a run has given."""
+    typer.echo(show.text(outcome.results))
+    if outcome.solution is not None:
+        typer.echo(f"\n{report.agreement(outcome.results, outcome.solution)}")
+        for warning in smolux.results.warnings(outcome.solution):
+            typer.echo(f"warning: rate equations: {warning}")
+    for remark in outcome.remarks:
+        say(remark)
+    say(f"results, figures and report.html are in {directory.path}")

@@ -1,20 +1,22 @@
-"""The work of ``smolux demo``."""
+"""``smolux demo``: a first run, whose exact solution is known."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from smolux import analysis
+import typer
+
+import smolux
 from smolux.analysis.table import aligned
 from smolux.case import Case, Output, Run
+from smolux.cli.commands.run import proceed
+from smolux.cli.console import say
+from smolux.cli.run_directory import RunDirectory
 from smolux.errors import InputError
 from smolux.kernels import Constant
 from smolux.model import Model
 from smolux.runtime.files import replacing
-
-from . import rundir, running
-from .console import say
 
 TITLE = "Demo: constant kernel"
 
@@ -29,7 +31,7 @@ def case(seed: int) -> Case:
     )
 
 
-def run(seed: int, folder: Path) -> tuple[str, bool]:
+def demonstrate(seed: int, folder: Path) -> tuple[str, bool]:
     """Run the demo in a folder.
 
     Returns
@@ -46,16 +48,17 @@ def run(seed: int, folder: Path) -> tuple[str, bool]:
     """
     directory = _folder(folder, case(seed))
     say(f"{TITLE}, 100000 particles, 8 replicas, seed {seed}")
-    outcome = running.proceed(directory)
-    rows = analysis.tables(analysis.summary(outcome.results), ["number_density"])[0][1]
+    outcome = proceed(directory)
+    summary = smolux.analysis.summary(outcome.results)
+    rows = smolux.analysis.tables(summary, ["number_density"])[0][1]
     header = ("time", "clusters per volume", *rows[0][2:])
     words, agrees = verdict(outcome.results)
     return "\n".join([*aligned([header, *rows[1:]]), "", words, _where(directory)]), agrees
 
 
-def _folder(folder: Path, wanted: Case) -> rundir.RunDirectory:
+def _folder(folder: Path, wanted: Case) -> RunDirectory:
     """Return the folder, cleared of an earlier demo."""
-    directory = rundir.RunDirectory(folder)
+    directory = RunDirectory(folder)
     if directory.case.is_file():
         if directory.load().title != TITLE:
             raise InputError(f"-o {folder}: holds a run of yours; name another folder")
@@ -71,7 +74,7 @@ def _folder(folder: Path, wanted: Case) -> rundir.RunDirectory:
 
 def verdict(ds: Any) -> tuple[str, bool]:
     """Say and return whether a result agrees with the exact solution."""
-    found = analysis.compare(ds, "exact").attrs
+    found = smolux.analysis.compare(ds, "exact").attrs
     agrees = found["agree"] == 1
     words = {1: "agrees with", 0: "DOES NOT AGREE with"}.get(found["agree"], "cannot be told from")
     text = (
@@ -83,5 +86,18 @@ def verdict(ds: Any) -> tuple[str, bool]:
     return text, agrees
 
 
-def _where(directory: rundir.RunDirectory) -> str:
+def _where(directory: RunDirectory) -> str:
     return f"Figures, results and {directory.report} are written; next: smolux new my-case"
+
+
+def demo(
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random numbers.")] = 1,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the demo.")] = Path(
+        "smolux-demo"
+    ),
+) -> None:
+    """Simulate the constant kernel, 8 replicas, and compare with the exact solution."""
+    words, agrees = demonstrate(seed, output)
+    typer.echo(words)
+    if not agrees:
+        raise typer.Exit(1)

@@ -1,50 +1,16 @@
-"""Results as text, and where they are found."""
+"""``smolux show``: the summary of a result."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
-from smolux import analysis, results
-from smolux.errors import InputError
-from smolux.results import warnings
-
-
-def find(path: Path) -> Path:
-    """Return the results file of a folder, or the file itself.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
-    if not path.is_dir():
-        return path
-    file = path / "results.nc"
-    if not file.is_file():
-        hint = f"; run it with: smolux run {path}" if (path / "case.toml").is_file() else ""
-        raise InputError(f"{path}: there is no results.nc in it{hint}")
-    return file
-
-
-def load(path: Path) -> Any:
-    """Read a result.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it cannot be read.
-    """
-    return results.load(find(path))
-
-
-def load_solution(path: Path) -> Any:
-    """Read the solution of the rate equations beside a result; None if there is none."""
-    file = find(path).with_name("solution.nc")
-    return results.load(file) if file.is_file() and file != path else None
-
+import smolux
+from smolux.cli import spatial_run
+from smolux.cli.run_directory import load_results
 
 #: output times in a table, unless all are wanted
 MOST = 12
@@ -62,9 +28,8 @@ def text(ds: Any, most: int = MOST) -> str:
     """
     attributes = ds.attrs
     if "sweep" in attributes:
-        return "\n".join(
-            [analysis.format_sweep(ds).rstrip(), *(f"warning: {w}" for w in warnings(ds))]
-        )
+        lines = [smolux.analysis.format_sweep(ds).rstrip()]
+        return "\n".join([*lines, *_warnings(ds)])
     facts = [str(attributes.get("method", "?"))]
     if "initial_particles" in attributes:
         facts += [
@@ -76,10 +41,14 @@ def text(ds: Any, most: int = MOST) -> str:
     if not attributes.get("complete", 1):
         facts.append("unfinished")
     lines = [str(attributes.get("title", "")), ", ".join(f for f in facts if f), ""]
-    lines.append(analysis.format_table(chosen(ds, most)).rstrip())
+    lines.append(smolux.analysis.format_table(chosen(ds, most)).rstrip())
     lines.append(shown(ds, most))
-    lines += [f"warning: {w}" for w in warnings(ds)]
+    lines += _warnings(ds)
     return "\n".join(line for n, line in enumerate(lines) if line or n == 2).strip()
+
+
+def _warnings(ds: Any) -> list[str]:
+    return [f"warning: {w}" for w in smolux.results.warnings(ds)]
 
 
 def shown(ds: Any, most: int) -> str:
@@ -94,7 +63,21 @@ def chosen(ds: Any, most: int) -> Any:
     some = ds
     if times > most:
         some = ds.isel(time=np.unique(np.linspace(0, times - 1, most).round().astype(int)))
-    summary = analysis.summary(some, sizes=()).assign_attrs(mass=analysis.mass_balance(ds))
+    summary = smolux.analysis.summary(some, sizes=()).assign_attrs(
+        mass=smolux.analysis.mass_balance(ds)
+    )
     constant = (0,) if "mass_in" in ds else (0, 1)  # what M0 is, the number density says
     changing = [p for p in summary["order"].values if p not in constant]
     return summary.drop_vars("n").sel(order=changing)
+
+
+def show(
+    path: Annotated[Path, typer.Argument(help="The folder of a run, or a results file.")],
+    every: Annotated[bool, typer.Option("--all", "-a", help="Show every output time.")] = False,
+) -> None:
+    """Show the summary of a result: means, 95 % intervals, exact values where known."""
+    ds = load_results(path)
+    if ds.attrs.get("kind") == "spatial":
+        typer.echo(spatial_run.text(ds))
+        return
+    typer.echo(text(ds, ds.sizes["time"] if every else MOST))

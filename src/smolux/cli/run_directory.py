@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import smolux
 from smolux.case import Case, load
 from smolux.case.spatial import SpatialCase
 from smolux.errors import InputError
@@ -105,3 +107,37 @@ def find(path: Path) -> RunDirectory:
     if not directory.case.is_file():
         raise InputError(f"{path}: is not the folder of a run, there is no case.toml in it")
     return directory
+
+
+def find_results(path: Path) -> Path:
+    """Return the results file of a folder, or the file itself.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if not path.is_dir():
+        return path
+    file = path / "results.nc"
+    if not file.is_file():
+        hint = f"; run it with: smolux run {path}" if (path / "case.toml").is_file() else ""
+        raise InputError(f"{path}: there is no results.nc in it{hint}")
+    return file
+
+
+def load_results(path: Path) -> Any:
+    """Read a result.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it cannot be read.
+    """
+    return smolux.results.load(find_results(path))
+
+
+def load_solution(path: Path) -> Any:
+    """Read the solution of the rate equations beside a result; None if there is none."""
+    file = find_results(path).with_name("solution.nc")
+    return smolux.results.load(file) if file.is_file() and file != path else None

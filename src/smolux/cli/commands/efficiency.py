@@ -1,19 +1,21 @@
-"""The work of ``smolux efficiency``: one case by several methods and weightings."""
+"""``smolux efficiency``: what methods and weightings are worth for a case."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from smolux import ensembles
-from smolux.case import Case
+import typer
+
+import smolux
+from smolux.case import Case, load
+from smolux.cli import console
+from smolux.cli.options import Overrides
+from smolux.cli.progress import Display
 from smolux.errors import InputError, Interrupted, did_you_mean
-from smolux.weighting import WEIGHTINGS, WeightFunction
+from smolux.weighting import NAMES, WeightFunction
 from smolux.weighting.base import Weighting
-
-from . import console
-from .progress import Display
 
 
 def weightings_of(texts: Sequence[str]) -> list[str | Weighting]:
@@ -24,7 +26,7 @@ def weightings_of(texts: Sequence[str]) -> list[str | Weighting]:
     InputError
         With all that are none.
     """
-    known = [w.name for w in WEIGHTINGS]
+    known = list(NAMES)
     found: list[str | Weighting] = []
     problems = []
     for text in texts:
@@ -46,7 +48,7 @@ def weightings_of(texts: Sequence[str]) -> list[str | Weighting]:
     return found
 
 
-def run(
+def measure(
     case: Case,
     methods: Sequence[str] | None,
     weightings: Sequence[str] | None,
@@ -76,7 +78,7 @@ def run(
     )
     try:
         with Display() as display:
-            ds = ensembles.efficiency(
+            ds = smolux.ensembles.efficiency(
                 seeded.model,
                 methods or [settings.method],
                 chosen,
@@ -96,17 +98,43 @@ def run(
         raise
     _print(ds)
     if figure is not None:
-        from smolux import plotting
-
-        plotting.save(plotting.efficiency(ds), figure)
+        smolux.plotting.save(smolux.plotting.efficiency(ds), figure)
         print(f"{figure} written")
 
 
 def _print(ds: Any) -> None:
-    print(ensembles.efficiency_table(ds))
+    print(smolux.ensembles.efficiency_table(ds))
     print(
         f"Bias against: {ds.attrs['reference']}. Efficiency: 1 / (cost variance), over that of "
         "the first row as ratio. Times are processor seconds without compilation."
     )
     if not ds.attrs["complete"]:
         console.say(f"statistics of {ds.attrs['replicas']:,} replicas")
+
+
+def efficiency(
+    case: Annotated[Path, typer.Argument(help="The case file.")],
+    overrides: Overrides = None,
+    method: Annotated[
+        list[str] | None,
+        typer.Option("--method", "-m", help="Only these methods; that of the case if left out."),
+    ] = None,
+    weighting: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--weighting",
+            "-w",
+            help="Only these, such as mass-flow or weight-function=0.5; number and mass-flow if "
+            "left out.",
+        ),
+    ] = None,
+    observable: Annotated[
+        list[str] | None,
+        typer.Option("--observable", "-o", help="Such as M2 or n_50; the target of the case, M2."),
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option("--figure", "-f", help="Draw the efficiencies into this file.")
+    ] = None,
+) -> None:
+    """Measure bias, variance, cost and efficiency with the particles and replicas of a case."""
+    measure(load(case, overrides or ()), method, weighting, observable, figure)

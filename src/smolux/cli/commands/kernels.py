@@ -1,10 +1,14 @@
-"""What is known of each kernel, as text."""
+"""``smolux kernels``: what laws there are, and what is known of each."""
 
 from __future__ import annotations
 
 import inspect
 from dataclasses import MISSING, fields
+from typing import Annotated
 
+import typer
+
+from smolux.cli import console
 from smolux.errors import InputError, did_you_mean
 from smolux.kernels import KERNELS
 from smolux.kernels.base import Kernel
@@ -104,3 +108,21 @@ def _physical(law: type[Kernel], constructor: str) -> list[str]:
         text = f'"{dimension.example}"' if dimension else repr(argument.default)
         lines.append(f"    {key} = {text}{optional}")
     return lines
+
+
+def kernels(
+    name: Annotated[str | None, typer.Argument(help="Show the details of one kernel.")] = None,
+) -> None:
+    """List the collision kernels, or show one: formula, degree, gelation, exact solution."""
+    if name is not None:
+        typer.echo(details(name))
+        return
+    console.table(
+        ("name", "degree", "gels", "exact", "K(i, j) / scale"), overview(), left=(0, 2, 3, 4)
+    )
+    typer.echo(
+        "Degree and gelation are those of the parameters in brackets, and of monomers of\n"
+        "unit density. Details of one: smolux kernels brownian\n"
+        "Any other law: a formula in the case file (smolux new NAME -t\n"
+        "custom-formula-kernel), or a Python function (smolux.kernels.from_function)."
+    )

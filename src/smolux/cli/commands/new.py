@@ -1,10 +1,13 @@
-"""The templates for new cases."""
+"""``smolux new``: a case file to start from, made of a template."""
 
 from __future__ import annotations
 
 import os
 from importlib import resources
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from smolux.errors import InputError, did_you_mean
 
@@ -60,3 +63,21 @@ def write(name: str, template: str) -> Path:
     except FileExistsError:
         raise InputError(f"{file}: is already there; choose another name") from None
     return file
+
+
+def new(
+    name: Annotated[str, typer.Argument(help="Name of the case; NAME.toml is written.")] = "",
+    template: Annotated[
+        str, typer.Option("--template", "-t", help="Which template; see --list.")
+    ] = "aggregation",
+    listing: Annotated[bool, typer.Option("--list", "-l", help="List the templates.")] = False,
+) -> None:
+    """Write a commented case file from a template; nothing is ever overwritten."""
+    if listing or not name:
+        for key, title in titles().items():
+            typer.echo(f"{key:24s}{title}")
+        if not listing:
+            typer.echo("\nMake one with: smolux new my-case --template shattering")
+        return
+    file = write(name, template)
+    typer.echo(f"{file} written; next: smolux check {file}, smolux run {file}")

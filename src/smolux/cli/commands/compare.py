@@ -1,4 +1,4 @@
-"""The work of ``smolux compare``: one case by several methods and the solver."""
+"""``smolux compare``: the same case by several methods and the solver."""
 
 from __future__ import annotations
 
@@ -6,20 +6,18 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+import typer
 
 import smolux
-from smolux import analysis
-from smolux.case import Case
-from smolux.deterministic import SolverError
-from smolux.deterministic.solver import solve
-from smolux.errors import InputError, Interrupted, did_you_mean, quiet
-from smolux.methods import METHODS
-from smolux.results import warnings
+from smolux.case import Case, load
+from smolux.cli import console
+from smolux.cli.options import Overrides
+from smolux.cli.progress import Display
+from smolux.errors import InputError, Interrupted, SolverError, did_you_mean, quiet
+from smolux.methods import NAMES
 from smolux.settings.solution import OBSERVED
-
-from . import console
-from .progress import Display
 
 SOLVER = "solver"
 EXACT: Literal["exact"] = "exact"
@@ -55,7 +53,7 @@ def choose(methods: Sequence[str] | None) -> list[str]:
     InputError
         If one is unknown.
     """
-    known = [*(m.name for m in METHODS), SOLVER]
+    known = [*NAMES, SOLVER]
     wrong = [m for m in methods or () if m not in known]
     if wrong:
         raise InputError([f"--method {m}: unknown{did_you_mean(m, known)}" for m in wrong])
@@ -94,7 +92,7 @@ def compute(
             with display() as progress:
                 found.append(_simulated(case, name, number, progress))
     for computed in found:
-        for text in warnings(computed.ds):
+        for text in smolux.results.warnings(computed.ds):
             console.say(f"{computed.name}: warning: {text}")
     return found
 
@@ -123,7 +121,7 @@ def _solved(case: Case, progress: Display) -> Computed:
         settings = case.solve_arguments()
     begun = time.perf_counter()
     with quiet():
-        ds = solve(case.model, **settings, progress=progress)
+        ds = smolux.solve(case.model, **settings, progress=progress)
     wall = time.perf_counter() - begun
     compiling = float(ds.attrs.get("compile_seconds", 0.0))
     return Computed(SOLVER, ds, wall - compiling, compiling, float("nan"))
@@ -132,7 +130,7 @@ def _solved(case: Case, progress: Display) -> Computed:
 def reference(found: Sequence[Computed]) -> tuple[str, Any]:
     """Choose what the others are compared with: the exact solution, the solver, or the first."""
     first = found[0]
-    if analysis.exact_dataset(first.ds) is not None:
+    if smolux.analysis.exact_dataset(first.ds) is not None:
         return EXACT, EXACT
     by_name = {c.name: c for c in found}
     best = by_name.get(SOLVER, first)
@@ -161,8 +159,8 @@ def rows(found: Sequence[Computed]) -> tuple[str, list[tuple[str, ...]], bool]:
         if each.name == name or (each.name == SOLVER and name == EXACT):
             table.append((*cells, *_deterministic(each, name)))
             continue
-        test = analysis.compare(each.ds, standard).attrs
-        known, words = analysis.verdict(test, tests)
+        test = smolux.analysis.compare(each.ds, standard).attrs
+        known, words = smolux.analysis.verdict(test, tests)
         agree = agree and known != 0
         where = f"{test['largest_sigmas']:.1f} in {test['where']}" if test["where"] else "-"
         words = words.upper() if known == 0 else words
@@ -174,11 +172,11 @@ def _deterministic(each: Computed, name: str) -> tuple[str, str, str]:
     """Cells of the reference, or of the solver beside the exact solution: no sigmas, a ratio."""
     if each.name == name:
         return "-", "-", "reference"
-    relative = analysis.compare(each.ds, EXACT)["moment"].sel(statistic="relative")
+    relative = smolux.analysis.compare(each.ds, EXACT)["moment"].sel(statistic="relative")
     return f"{float(abs(relative).max()):.1e} relative, in the moments", "-", "no scatter"
 
 
-def run(case: Case, methods: Sequence[str] | None, figure: Path | None) -> bool:
+def compared(case: Case, methods: Sequence[str] | None, figure: Path | None) -> bool:
     """Compute a case by several methods, print how they compare, and draw it if wanted.
 
     Returns
@@ -214,8 +212,25 @@ def run(case: Case, methods: Sequence[str] | None, figure: Path | None) -> bool:
         "1 of 100 tables or fewer."
     )
     if figure is not None:
-        from smolux import plotting
-
-        plotting.save(plotting.comparison({c.name: c.ds for c in found}), figure)
+        smolux.plotting.save(smolux.plotting.comparison({c.name: c.ds for c in found}), figure)
         print(f"{figure} written")
     return agree
+
+
+def compare(
+    case: Annotated[Path, typer.Argument(help="The case file.")],
+    overrides: Overrides = None,
+    method: Annotated[
+        list[str] | None,
+        typer.Option("--method", "-m", help="Only these methods; all and the solver if left out."),
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option("--figure", "-f", help="Draw the comparison into this file.")
+    ] = None,
+) -> None:
+    """Run a case by every method and the solver: differences in sigmas, and the time of each.
+
+    Ends with 1 if a method differs.
+    """
+    if not compared(load(case, overrides or ()), method, figure):
+        raise typer.Exit(1)
