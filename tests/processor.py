@@ -22,7 +22,7 @@ from smolux.weighting.base import Weighting
 
 #: what evaluates a law of the user, or one of ours, on arrays
 EVALUATIONS = ((Kernel, "__call__"), (Formula, "evaluate"), (Function, "evaluate"))
-WEIGHTS = ((Weighting, "weights"), (Weighting, "factors"))
+WEIGHTS = ((Weighting, "weights"), (Weighting, "rate_ratios"))
 
 #: an exact result, as of small whole numbers, is the same everywhere: its last bits are zero
 _LAST = np.uint64((1 << 20) - 1)

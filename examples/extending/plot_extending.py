@@ -15,7 +15,7 @@ import numpy as np
 import smolux as sx
 from smolux.initial import Initial
 from smolux.kernels import Kernel
-from smolux.processes import LoneProcess
+from smolux.processes import UnaryProcess
 from smolux.processes.daughters import Detached
 
 
@@ -55,7 +55,7 @@ def by_surface(k, rate):
 
 
 @dataclass(frozen=True)
-class Shedding(LoneProcess):
+class Shedding(UnaryProcess):
     """Particles of three units or more lose two of them, in proportion to their surface."""
 
     rate: float

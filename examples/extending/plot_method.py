@@ -21,11 +21,11 @@ from smolux.core.slots import slot_of
 from smolux.core.state import (
     FIRST,
     LARGEST,
-    LONE_BITS,
     PARTICLES,
     SECOND,
     STORED,
     TRIALS,
+    UNARY_BITS,
     VOLUME,
 )
 from smolux.core.store import Store, pieces_of
@@ -58,7 +58,7 @@ def pick(s, w, r, c):
     """Draw one of the particles in slot `c`."""
     while True:
         place = rng.below(s.rng, s.count[STORED])
-        if slot_of(w.sizes[place], LONE_BITS) == c:
+        if slot_of(w.sizes[place], UNARY_BITS) == c:
             return place, w.sizes[place]
 
 

@@ -72,7 +72,7 @@ def test_reference_against_closed_forms_of_time(varying):
     case = cell("2", "constant", "dilution", varying=varying)
     problem, end = case.problem, case.times[-1]
     exact = reference.solve(problem, case.times)
-    factor = problem.lone[0].factor
+    factor = problem.unary[0].factor
     right = closed.diluted_number(1.0, lambda t: 0.5 / end * factor(t), end, problem.breaks)
     assert exact.moment[-1, 0] == pytest.approx(right, rel=1e-9)
 

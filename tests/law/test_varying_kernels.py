@@ -20,7 +20,7 @@ from smolux.methods.choose import unforeseen
 from smolux.stochastic import checkpoint as checkpoints
 from smolux.stochastic.planning import make_plan
 from smolux.stochastic.replicas import Group
-from smolux.stochastic.windows import windows_for
+from smolux.stochastic.time_windows import time_windows_for
 
 P = sx.processes
 #: the choice by the sum is the loop's and not the method's: one method is quick to compile
@@ -210,7 +210,7 @@ def test_windows_bound_the_largest_term():
     """Pairs are drawn by the sum without factors, and no pair may be above the bound."""
     process = P.Aggregation("2 - t/10")
     kernel = sx.kernels.Constant() * "t" + sx.kernels.Additive() * "0.5*(4 - t)"
-    windows = windows_for([process], 4.0, None, kernel)
+    windows = time_windows_for([process], 4.0, None, kernel)
     ends = zip(windows.edges[:-2], windows.edges[1:-1], windows.bounds[:-1], strict=True)
     for start, end, bound in ends:
         t = np.linspace(start, end, 101)

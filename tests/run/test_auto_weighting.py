@@ -15,9 +15,8 @@ from shared import FORMULA
 from smolux import case as cases
 from smolux.cli.commands import run as command
 from smolux.errors import InputError
-from smolux.settings.target_error import Goal
-from smolux.stochastic import checkpoint, planning
-from smolux.stochastic import choose_weighting as pilot
+from smolux.settings.target_error import Target
+from smolux.stochastic import checkpoint, choose_weighting, planning
 from smolux.stochastic.choose_method import event_cost
 from smolux.stochastic.plan import Plan
 from smolux.stochastic.planning import make_plan
@@ -28,8 +27,8 @@ KERNEL = sx.kernels.formula(FORMULA, c0=1.0, c1=0.0, c2=0.0, c3=0.0)
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pilot, "_REPLICAS", 64)
-    monkeypatch.setattr(pilot, "_PARTICLES", 200)
+    monkeypatch.setattr(choose_weighting, "_REPLICAS", 64)
+    monkeypatch.setattr(choose_weighting, "_PARTICLES", 200)
 
 
 def model(initial: Any = None) -> sx.Model:
@@ -88,14 +87,16 @@ def test_what_a_weighting_is_worth(
 ) -> None:
     noise = np.random.default_rng(1).standard_normal((200, 2))
     trials = [
-        pilot._Trial(weighting, scale * (1 + np.array(d) / scale * noise), np.ones((200, 2)), cost)
+        choose_weighting._Trial(
+            weighting, scale * (1 + np.array(d) / scale * noise), np.ones((200, 2)), cost
+        )
         for weighting, d, scale, cost in zip(
             (sx.weighting.Number(), sx.weighting.MassFlow()), deviations, (1.0, mean), costs,
             strict=True,
         )
     ]  # fmt: skip
-    goal = Goal("M2", 0.5, 2, 2)
-    assert pilot._compared(goal, trials)[0].name == chosen
+    target = Target("M2")
+    assert choose_weighting._compared(target, trials)[0].name == chosen
 
 
 def test_what_has_no_scatter_is_left_alone() -> None:
@@ -111,14 +112,14 @@ def test_what_has_no_scatter_is_left_alone() -> None:
 def test_rule_where_a_pilot_takes_too_long(
     target: str, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(pilot, "_EFFORT", 1000)
+    monkeypatch.setattr(choose_weighting, "_EFFORT", 1000)
     found = plan(target)
     assert found.weighting.name == name
     assert "by rule" in found.weighting_reason
 
 
 def test_the_run_is_that_with_the_weighting_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pilot, "_POWERS", (0.5, 1.5))  # both of one compiled loop
+    monkeypatch.setattr(choose_weighting, "_POWERS", (0.5, 1.5))  # both of one compiled loop
     settings: dict[str, Any] = {"method": METHOD, "particles": 200, "replicas": 3, "seed": 7}
     chosen = sx.simulate(model(), [4.0], weighting="auto", target="n_9", **settings)
     assert chosen.attrs["weighting"] == "weight-function"

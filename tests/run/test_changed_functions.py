@@ -18,7 +18,7 @@ from smolux.deterministic.splitting import Splits
 from smolux.functions.content import digest, frozen, is_frozen
 from smolux.jit.compile import user_piece
 from smolux.stochastic.planning import make_plan
-from smolux.stochastic.windows import windows_for
+from smolux.stochastic.time_windows import time_windows_for
 
 slow = pytest.mark.slow
 METHODS = [
@@ -172,7 +172,7 @@ def test_bounds_in_time_are_those_of_now(monkeypatch: pytest.MonkeyPatch) -> Non
         monkeypatch.setitem(globals(), "height", value)
         kinds = [processes.Aggregation(), processes.Source(1.0, varying=in_time)]
         plan = planned(sx.Model(sx.kernels.Constant(), kinds))
-        windows = windows_for(plan.model.processes, 1.0)
+        windows = time_windows_for(plan.model.processes, 1.0)
         assert windows.bounds[:-1, 1].min() >= value
         assert windows.bounds[:-1, 1].max() <= 1.2 * value
 

@@ -12,7 +12,7 @@ from smolux import processes
 from smolux.cli.estimate import Pilot
 from smolux.stochastic.plan import Plan
 from smolux.stochastic.planning import make_plan
-from smolux.stochastic.windows import windows_for
+from smolux.stochastic.time_windows import time_windows_for
 
 
 def planned(
@@ -51,7 +51,7 @@ def test_the_volume_counts_what_is_simulated_until_the_end() -> None:
 def test_a_source_brings_in_what_is_simulated() -> None:
     """By mass, half a dimer beside one and a half monomers is two fifths."""
     plan = planned(1.0, weighting="mass-flow")
-    windows = windows_for(plan.model.processes, 10.0, plan.weighting)
+    windows = time_windows_for(plan.model.processes, 10.0, plan.weighting)
     np.testing.assert_allclose(windows.inflow, [2.5])
     np.testing.assert_allclose(windows.share, [[0.6, 1.0]])
 

@@ -22,7 +22,7 @@ from smolux.ensembles.efficiency import _compared, _reference
 from smolux.ensembles.ensemble import Collected
 from smolux.errors import InputError
 from smolux.exact import finite
-from smolux.settings.target_error import Goal
+from smolux.settings.target_error import Target
 from smolux.stochastic.planning import make_plan
 
 METHOD = "acceptance-rejection"
@@ -239,8 +239,8 @@ def test_the_bias_is_against_the_solution(kernel: Any, t: float, expected: Any):
         sizes=8,
         bins_per_octave=1,
     )
-    goals = [Goal(name, 0.5, 8, 8) for name in NAMES]
-    found = _reference(SimpleNamespace(plan=plan, goals=goals), NAMES, None)[0]  # type: ignore[arg-type]
+    targets = [Target(name) for name in NAMES]
+    found = _reference(SimpleNamespace(plan=plan, targets=targets), NAMES, None)[0]  # type: ignore[arg-type]
     for one, value in zip(found[:, 0], expected, strict=True):
         assert value is None or one == pytest.approx(value, rel=1e-5, nan_ok=True)
 

@@ -63,7 +63,7 @@ def test_densities_of_sizes_and_of_bins(method: str) -> None:
     agree(last["moment"].sel(order=2).values, DENSITY * 11)
 
 
-def test_a_goal_is_about_what_the_result_has() -> None:
+def test_a_target_is_what_the_result_has() -> None:
     """Also of clusters above the sizes that are counted by themselves."""
     model = runs.model(0.0, sx.initial.monodisperse(DENSITY), c1=0.0)
     for target, name, place in (
@@ -79,8 +79,8 @@ def test_a_goal_is_about_what_the_result_has() -> None:
         )  # fmt: skip
         group = Group.start(plan, 0, 8)
         group.advance(lambda: False)
-        assert plan.goal is not None
-        values, moved = observable(plan, plan.goal, [group])
+        assert plan.rule is not None
+        values, moved = observable(plan, plan.rule, [group])
         ds = to_dataset(plan.model, to_records(plan, [group]))
         np.testing.assert_allclose(values, ds[name].sel(place), rtol=1e-12)
         assert moved.all()

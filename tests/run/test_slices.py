@@ -33,7 +33,7 @@ METHODS = [
 ]
 PAIRS = [processes.Aggregation(), processes.Shattering("0.1 * (1 + sin(t)**2)")]
 OPEN = [processes.Aggregation(), processes.Removal(0.12), processes.Source({1: 1.0, 10: 0.1})]
-LONE = [
+UNARY = [
     processes.Aggregation(),
     processes.Fragmentation("0.05/(i + j)"),
     processes.Source(2.0, varying="1 + sin(t)"),
@@ -43,7 +43,7 @@ CASES = {
     "pairs": (PAIRS, 1.0, 300, 6.0),
     "open": (OPEN, 0.012, 150, 1.0),
     "open, fewer at the start": (OPEN, 0.3, 20, 9.0),
-    "single": (LONE, 0.5, 40, 6.0),
+    "single": (UNARY, 0.5, 40, 6.0),
 }
 
 

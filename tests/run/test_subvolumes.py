@@ -20,7 +20,7 @@ from smolux.runtime import resources, room
 from smolux.settings import simulation
 from smolux.stochastic import subvolumes
 from smolux.stochastic.replicas import Group
-from smolux.stochastic.subvolumes import Divided
+from smolux.stochastic.subvolumes import SubvolumeReplica
 
 pytestmark = shared.stopped
 
@@ -96,13 +96,13 @@ def test_a_late_error_goes_on_in_the_middle_of_a_stretch(
         else:
             patch.setattr(room, "_SMALL", 0)
             patch.setattr(resources, "free_memory", lambda: (free() or 1e9) if left[0] else 0.0)
-            mix = Divided._mix
+            mix = SubvolumeReplica._mix
 
             def fewer(divided: Any, pool: Any) -> None:
                 left[0] -= divided.state.clock[0, TIME] > 0.7 and left[0] > 0
                 mix(divided, pool)
 
-            patch.setattr(Divided, "_mix", fewer)
+            patch.setattr(SubvolumeReplica, "_mix", fewer)
         with pytest.raises(InputError, match=r"finite number|memory: .* are free") as caught:
             simulate(checkpoint=path, distribution=True)
     assert caught.value.checkpoint == path

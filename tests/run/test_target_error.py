@@ -18,7 +18,7 @@ from smolux.confidence import Sample, mean_interval
 from smolux.core.state import new_tally
 from smolux.errors import InputError, SmoluxWarning
 from smolux.observables import recorded
-from smolux.settings.target_error import Goal, Trial, judge, plan_replicas
+from smolux.settings.target_error import StoppingRule, Trial, assess, plan_replicas
 from smolux.stochastic import driving, replicas
 from smolux.stochastic import simulation as stochastic
 from smolux.stochastic.observe import observable
@@ -184,20 +184,20 @@ def test_replicas_that_no_longer_fit_end_it(monkeypatch: pytest.MonkeyPatch) -> 
 # --- the rule ------------------------------------------------------------------------------------
 
 
-def until(goal: Goal, draw: Any) -> Any:
+def until(rule: StoppingRule, draw: Any) -> Any:
     """Pilots, then the replicas of the result, as `smolux.stochastic.driving.Run.more` does it."""
-    pilots = draw(goal.first)
+    pilots = draw(rule.first)
     moved = np.array([True] * pilots.shape[1])
-    while (trial := plan_replicas(goal, pilots, moved)).pilots > len(pilots):
+    while (trial := plan_replicas(rule, pilots, moved)).pilots > len(pilots):
         assert trial.pilots <= 2 * len(pilots)
         pilots = np.concatenate([pilots, draw(trial.pilots - len(pilots))])
     values = draw(trial.replicas)
     while True:
-        verdict = judge(goal, values, moved)
-        if verdict.following == len(values):
-            return values, verdict, len(pilots)
-        assert len(values) < verdict.following <= max(2 * len(values), len(values) + 2)
-        values = np.concatenate([values, draw(verdict.following - len(values))])
+        assessment = assess(rule, values, moved)
+        if assessment.following == len(values):
+            return values, assessment, len(pilots)
+        assert len(values) < assessment.following <= max(2 * len(values), len(values) + 2)
+        values = np.concatenate([values, draw(assessment.following - len(values))])
 
 
 @pytest.mark.parametrize(
@@ -209,14 +209,14 @@ def until(goal: Goal, draw: Any) -> Any:
 )
 def test_intervals_hold_and_the_mean_has_no_bias(law: Any, error: float) -> None:
     """Coverage of 95 %; stopping when the interval is short makes a skewed mean too small."""
-    goal, draws = Goal("M3", error, 8, 10_000), np.random.default_rng(3)
+    rule, draws = StoppingRule("M3", error, 8, 10_000), np.random.default_rng(3)
     means, inside, trials = [], 0, 200
     for _ in range(trials):
-        values, verdict, _ = until(goal, lambda n: law.rvs((n, 1), random_state=draws))
+        values, assessment, _ = until(rule, lambda n: law.rvs((n, 1), random_state=draws))
         lower, upper = mean_interval(Sample.of(values))
         inside += int(lower[0] <= law.mean() <= upper[0])
         means.append(values.mean() / law.mean())
-        assert verdict.error <= error
+        assert assessment.error <= error
     # four standard deviations of the share of 200 trials
     assert inside / trials > 0.95 - 4 * 0.0154
     assert np.mean(np.abs(np.array(means) - 1) <= error) > 0.93
@@ -224,11 +224,11 @@ def test_intervals_hold_and_the_mean_has_no_bias(law: Any, error: float) -> None
 
 
 def test_every_output_time_counts() -> None:
-    goal, draws = Goal("number_density", 0.01, 8, 10_000), np.random.default_rng(4)
+    rule, draws = StoppingRule("number_density", 0.01, 8, 10_000), np.random.default_rng(4)
     scatter = np.array([0.0, 0.04, 0.01])
-    values, verdict, pilots = until(goal, lambda n: 1 + scatter * draws.standard_normal((n, 3)))
-    assert verdict.at == 1
-    assert verdict.error <= goal.error
+    values, assessment, pilots = until(rule, lambda n: 1 + scatter * draws.standard_normal((n, 3)))
+    assert assessment.at == 1
+    assert assessment.error <= rule.error
     assert 40 < len(values) < 200
     assert pilots < 60
 
@@ -236,17 +236,17 @@ def test_every_output_time_counts() -> None:
 def test_pilots_say_what_it_takes() -> None:
     """A scatter of 4 % takes ``(1.96 * 4)**2 = 61`` replicas for 1 %, and some to be sure."""
     pilots = 1 + 0.04 * stats.norm.ppf((np.arange(30) + 0.5) / 30)[:, None]
-    trial = plan_replicas(Goal("M2", 0.01, 8, 10_000), pilots, np.array([True]))
+    trial = plan_replicas(StoppingRule("M2", 0.01, 8, 10_000), pilots, np.array([True]))
     assert trial.pilots == 30
     assert 61 <= trial.replicas <= 100
 
 
 def test_what_pilots_do_not_see_takes_more_of_them() -> None:
-    goal, moved = Goal("n_30", 0.1, 8, 500), np.array([True])
-    assert plan_replicas(goal, np.zeros((8, 1)), moved) == Trial(16, 500)
-    assert plan_replicas(goal, np.zeros((500, 1)), moved) == Trial(500, 500)
+    rule, moved = StoppingRule("n_30", 0.1, 8, 500), np.array([True])
+    assert plan_replicas(rule, np.zeros((8, 1)), moved) == Trial(16, 500)
+    assert plan_replicas(rule, np.zeros((500, 1)), moved) == Trial(500, 500)
     # nothing has happened: certain
-    assert plan_replicas(goal, np.zeros((8, 1)), np.array([False])) == Trial(8, 8)
+    assert plan_replicas(rule, np.zeros((8, 1)), np.array([False])) == Trial(8, 8)
 
 
 def test_evaporation_without_a_collision_is_something() -> None:
@@ -270,13 +270,13 @@ def test_evaporation_without_a_collision_is_something() -> None:
     for name in ("collisions", "mass_in", "mass_out"):
         recorded(tally, name)[:] = 0.0
     group: Any = SimpleNamespace(tally=tally)
-    assert plan.goal is not None
-    values, moved = observable(plan, plan.goal, [group])
+    assert plan.rule is not None
+    values, moved = observable(plan, plan.rule, [group])
     assert not moved.any()
     recorded(tally, "events")[0, 0, 1] = 1
-    values, moved = observable(plan, plan.goal, [group])
+    values, moved = observable(plan, plan.rule, [group])
     assert moved.all()
-    assert judge(plan.goal, values, moved).error == np.inf
+    assert assess(plan.rule, values, moved).error == np.inf
 
 
 # --- mistakes ------------------------------------------------------------------------------------

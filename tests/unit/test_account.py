@@ -127,7 +127,7 @@ def test_kernel_on_multiples(law):
     kernel = on_multiples(law, 7)
     i = np.array([1.0, 2.0, 5.0])
     np.testing.assert_array_equal(kernel(i, 3.0), law(7 * i, 21.0))
-    left, right = kernel.factors(i)
+    left, right = kernel.low_rank_factors(i)
     np.testing.assert_allclose((left.T @ right), kernel(i[:, None], i[None, :]), rtol=1e-13)
 
 

@@ -12,7 +12,7 @@ from scipy import stats
 import smolux as sx
 from smolux.core import seeds, splits
 from smolux.core.slots import slot_edges
-from smolux.core.state import LONE_BITS, State, new_state
+from smolux.core.state import UNARY_BITS, State, new_state
 from smolux.functions.user_function import Function
 from smolux.processes import Fragmentation
 from smolux.stochastic import assembly
@@ -20,7 +20,7 @@ from smolux.stochastic import assembly
 #: any power of the product, in one compiled function
 LAW = "(i*j)**p"
 TOTAL, _, PART = splits.bind_splits(sx.kernels.formula(LAW, p=0.0).rate)
-EDGES = slot_edges(LONE_BITS).astype(float)
+EDGES = slot_edges(UNARY_BITS).astype(float)
 
 
 @numba.njit
@@ -73,7 +73,7 @@ def test_bounds_of_a_slot_hold_for_its_largest_size() -> None:
         processes = [sx.processes.Aggregation(), Fragmentation(law)]
         parameters = assembly.factor_parameters(processes)
         assembly.bound_splits(processes, parameters, 20_000)
-        known = parameters.lone[0][1]
+        known = parameters.unary[0][1]
         assert known.bounds[slot - splits._FIRST].max() >= 21.0 * (top // 2)
 
 

@@ -135,7 +135,7 @@ def test_rate_takes_numbers_and_arrays(law: Kernel) -> None:
 @every_law
 def test_factors(law: Kernel) -> None:
     sizes = np.arange(1.0, 400)
-    found = law.factors(sizes)
+    found = law.low_rank_factors(sizes)
     ranks = {
         "constant": 1, "additive": 2, "multiplicative": 1, "bilinear": 2, "product": 1,
         "brownian": 3, "generalized-brownian": 2, "shear": 4, "clusters": 3,

@@ -74,9 +74,9 @@ def test_intervals_factors_and_majorants_are_those_of_the_terms() -> None:
     assert found.lo <= float(SUMS[1](2, 3)) <= float(SUMS[1](5, 4)) <= found.hi
     sizes = np.arange(1.0, 30.0)
     two = 3 * kernels.Bilinear(0.5, 0.25, scale=2.0) + kernels.Constant(0.7)
-    left, right = two.factors(sizes)
+    left, right = two.low_rank_factors(sizes)
     np.testing.assert_allclose(left.T @ right, two(sizes[:, None], sizes))
-    assert SUMS[1].factors(sizes) is None  # a formula has none
+    assert SUMS[1].low_rank_factors(sizes) is None  # a formula has none
     majorant = (BROWNIAN + SHEAR).majorant()
     ratio = (BROWNIAN + SHEAR)(sizes[:, None], sizes) / majorant(sizes[:, None], sizes)
     assert majorant.least * (1 - 1e-12) <= ratio.min()

@@ -20,7 +20,7 @@ from smolux.functions.user_function import numbers_of
 from smolux.kernels import formula, from_function
 from smolux.model_dict import model_from_dict, model_to_dict
 from smolux.processes import Aggregation, Removal, Shattering
-from smolux.stochastic.windows import windows_for
+from smolux.stochastic.time_windows import time_windows_for
 
 HOURS = np.array([0.0, 7.0, 7.01, 7.02, 100.0])
 FLOW = np.array([0.5, 0.0, 50.0, 0.0, 2.0])
@@ -192,7 +192,7 @@ def test_stated_bounds_of_time(bounds: Any, expected: float) -> None:
 def test_windows_bound_a_factor_up_to_their_ends() -> None:
     """Of encounters the sum, without single particles; the last window begins after the end."""
     rising = Shattering("0.1 + t")
-    windows = windows_for([Aggregation(), rising, Removal(0.1, varying="1 + t")], 10.0)
+    windows = time_windows_for([Aggregation(), rising, Removal(0.1, varying="1 + t")], 10.0)
     begun = windows.edges[:-1] < 10.0
     ends = windows.edges[1:][begun]
     assert ends[-1] >= 10.0
@@ -205,12 +205,12 @@ def test_windows_bound_a_factor_up_to_their_ends() -> None:
 def test_breakpoints_end_windows() -> None:
     low, high = np.sqrt(900.0), np.sqrt(900.06)
     stated = sx.law(square_spike, breakpoints=[high, low])
-    windows = windows_for([Aggregation(), Shattering(stated), Removal(0.1)], 100.0)
+    windows = time_windows_for([Aggregation(), Shattering(stated), Removal(0.1)], 100.0)
     (held,) = np.flatnonzero(windows.bounds[:, 1])
     assert windows.edges[[held, held + 1]].tolist() == [low, high]
     assert windows.bounds[held, 1] == pytest.approx(1100.0)
     # those of a factor do not depend on the end
-    longer = windows_for([Aggregation(), Shattering(stated), Removal(0.1)], 1000.0)
+    longer = time_windows_for([Aggregation(), Shattering(stated), Removal(0.1)], 1000.0)
     count = len(windows.edges) - 2
     np.testing.assert_array_equal(windows.edges[:count], longer.edges[:count])
     np.testing.assert_array_equal(windows.bounds[:count], longer.bounds[:count])

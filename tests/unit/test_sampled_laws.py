@@ -10,7 +10,7 @@ import pytest
 from smolux import kernels
 from smolux.functions.time import TimeFunction
 from smolux.processes import Removal
-from smolux.stochastic.windows import windows_for
+from smolux.stochastic.time_windows import time_windows_for
 
 TABLE = np.array([0.0, 7.0, 7.01, 7.02, 100.0])
 VALUES = np.array([0.0, 0.0, 50.0, 0.0, 0.0])
@@ -73,7 +73,7 @@ def test_functions_of_time(function: object, window: tuple[float, float], peak: 
 
 def test_no_window_of_zero_beside_one_that_is_not() -> None:
     """A bound of zero is never tried, and so never repaired."""
-    windows = windows_for([Removal(0.1, varying=spike)], 100.0)
+    windows = time_windows_for([Removal(0.1, varying=spike)], 100.0)
     upper, edges = windows.bounds[:, 0], windows.edges
     peak = int(np.searchsorted(edges, 30.0, side="right")) - 1  # from 30 on, which it names
     assert upper[peak] >= 1000

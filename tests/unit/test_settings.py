@@ -156,8 +156,8 @@ def test_settings_are_plain_data_and_back() -> None:
         assert again == {name: getattr(settings, name) for name in names(Settings)}
     assert Settings(**from_plain(Settings, plain(Settings, plan.asked))) == plan.asked
     assert plan.asked.replicas == plan.replicas == 9
-    assert plan.goal is not None
-    assert (plan.goal.first, plan.goal.most, plan.goal.order) == (9, 11, 1.5)
+    assert plan.rule is not None
+    assert (plan.rule.first, plan.rule.most, plan.rule.order) == (9, 11, 1.5)
 
 
 def test_a_mistake_knows_its_place() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from smolux.confidence import Sample, mean_interval
-from smolux.settings.target_error import Goal, judge, plan_replicas
+from smolux.settings.target_error import StoppingRule, assess, plan_replicas
 from verification.outcome import Check, Item, Outcome, Table
 
 from .common import REPLICAS, sampled
@@ -25,19 +25,21 @@ _TRIALS = 400
 _MOST = 20_000
 
 
-def _until(goal: Goal, values: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, int]:
+def _until(
+    rule: StoppingRule, values: np.ndarray, rng: np.random.Generator
+) -> tuple[np.ndarray, int]:
     """Return what `smolux.simulate` would end with, and the number of pilots."""
     moved = np.array([True])
 
     def draw(count: int) -> np.ndarray:
         return rng.choice(values, count)[:, None]
 
-    pilots = draw(goal.first)
-    while (trial := plan_replicas(goal, pilots, moved)).pilots > len(pilots):
+    pilots = draw(rule.first)
+    while (trial := plan_replicas(rule, pilots, moved)).pilots > len(pilots):
         pilots = np.concatenate([pilots, draw(trial.pilots - len(pilots))])
     found = draw(trial.replicas)
-    while (verdict := judge(goal, found, moved)).following > len(found):
-        found = np.concatenate([found, draw(verdict.following - len(found))])
+    while (assessment := assess(rule, found, moved)).following > len(found):
+        found = np.concatenate([found, draw(assessment.following - len(found))])
     return found, len(pilots)
 
 
@@ -49,7 +51,7 @@ def _compute(quick: bool) -> dict[str, Any]:
         held, counts, pilots, means = 0, [], [], []
         trials = 50 if quick else _TRIALS
         for _ in range(trials):
-            found, many = _until(Goal(target, error, 8, _MOST), values, rng)
+            found, many = _until(StoppingRule(target, error, 8, _MOST), values, rng)
             lower, upper = mean_interval(Sample.of(found))
             held += int(lower[0] <= true <= upper[0])
             counts.append(len(found))

@@ -15,7 +15,7 @@ from scipy import special
 
 import smolux as sx
 
-from .reference import Float, Inflow, Law, Lone, OfTime, Pairs, one
+from .reference import Float, Inflow, Law, OfTime, Pairs, Unary, one
 
 P = sx.processes
 
@@ -300,19 +300,19 @@ PROCESSES = (
     Process(
         "scission", "fragmentation",
         lambda s, v: P.Fragmentation(0.8 / (s.size * s.time), varying=v),
-        lambda s, f: Lone(
+        lambda s, f: Unary(
             "fragmentation", lambda k: 0.4 / (s.size * s.time) * (k - 1), _broken, f
         ),
     ),
     Process(
         "breakage", "fragmentation",
         lambda s, v: P.Fragmentation(f"{1 / s.time!r}/(i + j)", varying=v),
-        lambda s, f: Lone("fragmentation", lambda k: 0.5 / s.time * (k - 1) / k, _broken, f),
+        lambda s, f: Unary("fragmentation", lambda k: 0.5 / s.time * (k - 1) / k, _broken, f),
     ),
     Process(
         "evaporation", "evaporation",
         lambda s, v: P.Evaporation(f"{0.8 / s.time!r}*(k/{s.size!r})**(1/3)", varying=v),
-        lambda s, f: Lone(
+        lambda s, f: Unary(
             "evaporation",
             lambda k: np.where(k > 1, 0.8 / s.time * (k / s.size) ** (1 / 3), 0.0),
             _evaporated, f,
@@ -320,12 +320,12 @@ PROCESSES = (
     ),
     Process(
         "dilution", "removal", lambda s, v: P.Removal(0.5 / s.time, varying=v),
-        lambda s, f: Lone("removal", lambda k: 0.5 / s.time, None, f),
+        lambda s, f: Unary("removal", lambda k: 0.5 / s.time, None, f),
     ),
     Process(
         "deposition", "removal",
         lambda s, v: P.Removal(f"{0.5 / s.time!r}*sqrt(k/{s.size!r})", varying=v),
-        lambda s, f: Lone("removal", lambda k: 0.5 / s.time * np.sqrt(k / s.size), None, f),
+        lambda s, f: Unary("removal", lambda k: 0.5 / s.time * np.sqrt(k / s.size), None, f),
     ),
     Process(
         "removal above", "removal", lambda s, v: P.Removal(above=_above(s)),

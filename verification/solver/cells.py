@@ -78,7 +78,7 @@ class Cell:
             law=self.kernel.law,
             pairs=[reference.Pairs("aggregation"),
                    *(p for p in plain if isinstance(p, reference.Pairs))],
-            lone=[p for p in plain if isinstance(p, reference.Lone)],
+            unary=[p for p in plain if isinstance(p, reference.Unary)],
             inflow=inflow,
             start=self.start.densities,
             largest=int(max(60, 1.5 * largest, 18 * self.start.scale)),

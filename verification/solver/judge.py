@@ -44,7 +44,7 @@ def limited(seconds: float) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Assessment:
     """What came of a solution.
 
     Attributes
@@ -71,7 +71,7 @@ class Verdict:
 
 def judge(
     model: Any, exact: reference.Solution, times: list[float], limit: float, **options: Any
-) -> Verdict:
+) -> Assessment:
     """Solve and compare."""
     begun = time.process_time()
     try:
@@ -79,10 +79,10 @@ def judge(
             warnings.simplefilter("always")
             ds = sx.solve(model, times, **options)
     except TooLongError:
-        return Verdict("too long", time.process_time() - begun, {})
+        return Assessment("too long", time.process_time() - begun, {})
     except Exception as error:  # whatever it is, it is the outcome
         seconds = time.process_time() - begun
-        return Verdict(type(error).__name__, seconds, {}, str(error).split("\n")[0][:200])
+        return Assessment(type(error).__name__, seconds, {}, str(error).split("\n")[0][:200])
     said = {
         str(w.message).split("\n")[0][:160]: w.category for w in caught
         if issubclass(w.category, (SmoluxWarning, RuntimeWarning))
@@ -90,7 +90,7 @@ def judge(
     remark = "; ".join(f"{kind.__name__}: {text}" for text, kind in said.items())
     errors = compare(ds, exact)
     window = int(str(ds.attrs["window"]).strip("[]").split(",")[-1])
-    return Verdict("solved", time.process_time() - begun, errors, remark, window)
+    return Assessment("solved", time.process_time() - begun, errors, remark, window)
 
 
 def compare(ds: Any, exact: reference.Solution) -> dict[str, float]:

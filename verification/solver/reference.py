@@ -116,7 +116,7 @@ class Pairs:
 
 
 @dataclass(frozen=True)
-class Lone:
+class Unary:
     """A particle vanishes at ``rate(k)``; `made` gives what appears from what vanishes."""
 
     name: str
@@ -152,7 +152,7 @@ class Problem:
 
     law: Law
     pairs: Sequence[Pairs]
-    lone: Sequence[Lone]
+    unary: Sequence[Unary]
     inflow: Sequence[Inflow]
     start: Callable[[int], Float]
     largest: int
@@ -209,9 +209,9 @@ class _Rates:
         self.k = np.arange(1.0, largest + 1.0)
         self.beyond = np.arange(largest + 1.0, 2.0 * largest + 1.0)
         self.sums = Sums(problem.law, largest, falls=problem.cut is None)
-        self.rate = [np.broadcast_to(p.rate(self.k), self.k.shape) for p in problem.lone]
+        self.rate = [np.broadcast_to(p.rate(self.k), self.k.shape) for p in problem.unary]
         self.debris = {p.name: fragments(p.made, 2 * largest) for p in problem.pairs if p.made}
-        self.names = [p.name for p in (*problem.pairs, *problem.lone, *problem.inflow)]
+        self.names = [p.name for p in (*problem.pairs, *problem.unary, *problem.inflow)]
 
     def __call__(self, t: float, y: Float) -> Float:
         self.left -= 1
@@ -239,7 +239,7 @@ class _Rates:
                 dn[0] += f * (lost @ k)
             else:
                 dn[: len(p.made)] += f * (made @ self.debris[p.name])
-        for p, rate in zip(self.problem.lone, self.rate, strict=True):
+        for p, rate in zip(self.problem.unary, self.rate, strict=True):
             gone = p.factor(t) * rate * n
             events[at] = gone.sum()
             at += 1

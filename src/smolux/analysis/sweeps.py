@@ -27,7 +27,7 @@ _LONG_NAMES = {
 }
 
 
-def gather(
+def combine_sweep(
     axes: Mapping[str, Sequence[Any]],
     points: Sequence[xr.Dataset | None],
     messages: Sequence[str],

@@ -1,8 +1,8 @@
 """What happens when the pending event comes, whatever its kind: one `fire` for all loops.
 
 A loop of encounters alone knows one kind of events, `make_encounters`; those of single particles
-and of sources join them in `smolux.core.beside`. What only systems with such events keep, `Books`,
-is left out of the loops of the others when they are compiled.
+and of sources join them in `smolux.core.superposition`. What only systems with such events keep,
+`Books`, is left out of the loops of the others when they are compiled.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Kinds(NamedTuple):
 
 
 class Books(NamedTuple):
-    """What is kept where encounters are not all that happens, see `smolux.core.beside`.
+    """What is kept where encounters are not all that happens, see `smolux.core.superposition`.
 
     Attributes
     ----------
@@ -213,7 +213,7 @@ def _make_exchange(
             if highest > windows.cut[0]:
                 entries = cut_off(s, windows, entries, p)
         reason = 0
-        if singles > 0 and wanting(s, entries, q.lone):
+        if singles > 0 and wanting(s, entries, q.unary):
             reason = SPLITS
         elif not update(s, w, gone, entries, p):
             reason = GROW
@@ -224,7 +224,7 @@ def _make_exchange(
                 s.clock[MASS_OUT], s.events[windows.cut[1]] = out, cut
             return reason
         if singles > 0:
-            enter(s, gone, i, j, entries, q.lone)
+            enter(s, gone, i, j, entries, q.unary)
         if keeps:
             for e in range(entries):
                 s.count[LARGEST] = max(s.count[LARGEST], s.sizes[e])

@@ -72,7 +72,7 @@ class Pieces(NamedTuple):
     pick : ``pick(s, w, r, c)``
         Place and size of one of the particles in slot `c` of `State.held`, or in this and others;
         each with a chance in proportion to ``s.most[r]`` of its slot.
-    seize : ``seize(s, w, place)``
+    select : ``select(s, w, place)``
         Put that particle in the place of the first of the pair.
     visit : ``visit(s, w, t, grid, p)``
         Call the `tally` that `Method.bind` was given for the particles present, with all but
@@ -88,7 +88,7 @@ class Pieces(NamedTuple):
     prepare: Any
     double: Any
     pick: Any
-    seize: Any
+    select: Any
     visit: Any
     burst: Burst | None = None
 

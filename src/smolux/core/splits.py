@@ -23,7 +23,7 @@ from smolux.jit.compile import cold_piece, piece, user_piece
 from . import rng
 from .bounds import ROUNDING, note_bad
 from .slots import octave, slot_of, slot_top
-from .state import COUNTED, LONE_BITS, LONE_SLOTS, RAISED, SPLIT_IN_DOUBT, TRIALS
+from .state import COUNTED, RAISED, SPLIT_IN_DOUBT, TRIALS, UNARY_BITS, UNARY_SLOTS
 
 #: largest sizes of which all splits are gone through: in any case, where bounds are not proved and
 #: close, and in slots of narrow laws
@@ -34,7 +34,7 @@ _SPREAD = np.uint64(0x9E3779B97F4A7C15)
 #: bins of any size, at most
 _BINS = 2 * 62
 #: the slots of `_SMALL` and `EXACT`
-_FIRST, _PROVED = (10 - LONE_BITS + 1) << LONE_BITS, (14 - LONE_BITS + 1) << LONE_BITS
+_FIRST, _PROVED = (10 - UNARY_BITS + 1) << UNARY_BITS, (14 - UNARY_BITS + 1) << UNARY_BITS
 #: shares of candidates that come to something, below which bounds are not close, a law is narrow
 _CLOSE, _NARROW = 1 / 2, 1 / 32
 
@@ -69,7 +69,7 @@ def new_splits(proved: bool) -> Splits:
 
     Unless bounds of the law can be `proved`, none are asked for up to `EXACT`.
     """
-    rows, slots = EXACT + 1 + (1 << _KEPT_BITS), LONE_SLOTS - _FIRST
+    rows, slots = EXACT + 1 + (1 << _KEPT_BITS), UNARY_SLOTS - _FIRST
     bounds, narrow = np.zeros((slots, _BINS)), np.zeros(slots, np.bool_)
     first = 0 if proved else _PROVED - _FIRST
     narrow[:first], bounds[first:, 0] = True, -1.0
@@ -79,8 +79,8 @@ def new_splits(proved: bool) -> Splits:
 
 def slots_beside(size: int) -> slice:
     """Return the slots of the octave of a size."""
-    first = (int(size).bit_length() - LONE_BITS) << LONE_BITS
-    return slice(first, first + (1 << LONE_BITS))
+    first = (int(size).bit_length() - UNARY_BITS) << UNARY_BITS
+    return slice(first, first + (1 << UNARY_BITS))
 
 
 def fill(splits: Splits, slots: slice, bounds: Any, widths: Any, means: Any, proved: Any) -> None:
@@ -102,7 +102,7 @@ def bins_of(k):
 @piece
 def width_of(k, b):
     """Most splits that a bin has for a size in the slot of k."""
-    return stretch(slot_top(slot_of(k, np.int64(LONE_BITS)), np.int64(LONE_BITS)), b)[1]
+    return stretch(slot_top(slot_of(k, np.int64(UNARY_BITS)), np.int64(UNARY_BITS)), b)[1]
 
 
 @piece
@@ -166,7 +166,7 @@ def bind_splits(rate: Callable[..., Any]) -> tuple[Any, Any, Any]:
     def row_of(k, q):
         """Row of a size, or -1 if it has none."""
         row = k
-        if k > _SMALL and not q[1].narrow[slot_of(k, np.int64(LONE_BITS)) - _FIRST]:
+        if k > _SMALL and not q[1].narrow[slot_of(k, np.int64(UNARY_BITS)) - _FIRST]:
             return np.int64(-1)
         if k > EXACT:
             if k > _LARGEST:
@@ -182,7 +182,7 @@ def bind_splits(rate: Callable[..., Any]) -> tuple[Any, Any, Any]:
         """Cumulative sum of the bounds up to a bin."""
         if row >= 0:
             return q[1].ends[row, b]
-        return q[1].bounds[slot_of(k, np.int64(LONE_BITS)) - _FIRST, b]
+        return q[1].bounds[slot_of(k, np.int64(UNARY_BITS)) - _FIRST, b]
 
     @cold_piece
     def total(size, s, q):
@@ -195,7 +195,7 @@ def bind_splits(rate: Callable[..., Any]) -> tuple[Any, Any, Any]:
 
     @piece
     def known(size, q):
-        return size <= _SMALL or q[1].bounds[slot_of(size, np.int64(LONE_BITS)) - _FIRST, 0] >= 0.0
+        return size <= _SMALL or q[1].bounds[slot_of(size, np.int64(UNARY_BITS)) - _FIRST, 0] >= 0.0
 
     @piece
     def candidate(s, k, row, q):

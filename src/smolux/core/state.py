@@ -35,17 +35,17 @@ WORST_I = _count(
     "worst_i", Rule.WHOLE
 )  # sizes of the latest such pair, or of a rate that is no rate
 WORST_J = _count("worst_j", Rule.WHOLE)
-KIND = _count("kind", Rule.APART)  # of the pending event, see `smolux.core.beside`
+KIND = _count("kind", Rule.APART)  # of the pending event, see `smolux.core.superposition`
 #: the single particle of the pending event, its size, its process, one of two fragments
-LONE = _count("lone", Rule.APART)
-LONE_SIZE = _count("lone_size", Rule.APART)
-LONE_PROCESS = _count("lone_process", Rule.APART)
-LONE_PART = _count("lone_part", Rule.APART)
+UNARY = _count("unary", Rule.APART)
+UNARY_SIZE = _count("unary_size", Rule.APART)
+UNARY_PROCESS = _count("unary_process", Rule.APART)
+UNARY_PART = _count("unary_part", Rule.APART)
 #: whose rate is no rate: 0 the kernel, r + 1 process r of single particles
 CULPRIT = _count("culprit", Rule.APART)
 WANTED = _count("wanted", Rule.APART)  # the size of which the splits are to be bounded
 VAIN = _count("vain", Rule.APART)  # candidates of single particles in vain since all were counted
-#: 1: encounters are drawn after what else may come first, see `smolux.core.beside`
+#: 1: encounters are drawn after what else may come first, see `smolux.core.superposition`
 LATE = _count("late", Rule.APART)
 COUNTS = len(_count)
 
@@ -106,10 +106,10 @@ SPLITS = 8  # bounds of the splits of a size are asked for
 BAD_SHARE = 9  # a share of encounters is not between 0 and 1
 
 #: slots an octave by which single particles are told apart, as a power of two, and how many in all
-LONE_BITS = 3
+UNARY_BITS = 3
 #: slot that holds no size, but 1 if all particles are counted
 COUNTED = 0
-LONE_SLOTS = 61 << LONE_BITS
+UNARY_SLOTS = 61 << UNARY_BITS
 
 
 class State(NamedTuple):
@@ -175,7 +175,7 @@ def hand_on(whole: State, part: State) -> None:
         its[at] = mine[at]
 
 
-class Windows(NamedTuple):
+class TimeWindows(NamedTuple):
     """Bounds of the rate factors of P processes in W windows of time.
 
     Attributes
@@ -212,16 +212,16 @@ class Parameters(NamedTuple):
         Of pairs: of the factors in time, of what comes of an encounter, and of the share of them
         in which it does, if any of these is not one. Of a kernel that varies `factors` has one more
         entry: for each term of it those of its factor and of its rate.
-    lone, lone_factors : tuple
-        Of single particles: of the rates, see `smolux.core.lone.Law`, and of the factors.
+    unary, unary_factors : tuple
+        Of single particles: of the rates, see `smolux.core.unary.Law`, and of the factors.
     source_factors : tuple
     """
 
     factors: tuple[Any, ...]
     outcomes: tuple[Any, ...]
     shares: tuple[Any, ...]
-    lone: tuple[Any, ...]
-    lone_factors: tuple[Any, ...]
+    unary: tuple[Any, ...]
+    unary_factors: tuple[Any, ...]
     source_factors: tuple[Any, ...]
 
 
@@ -267,13 +267,13 @@ class Grid(NamedTuple):
     processes: np.ndarray
 
 
-def new_state(rng: np.ndarray, processes: int, entries: int, lone: int) -> State:
+def new_state(rng: np.ndarray, processes: int, entries: int, unary: int) -> State:
     """Make an empty state for as many replicas as there are streams.
 
-    `lone` of the processes are of single particles.
+    `unary` of the processes are of single particles.
     """
     replicas = len(rng)
-    slots = LONE_SLOTS if lone else 0
+    slots = UNARY_SLOTS if unary else 0
     return State(
         rng,
         np.zeros((replicas, CLOCKS + processes)),
@@ -283,8 +283,8 @@ def new_state(rng: np.ndarray, processes: int, entries: int, lone: int) -> State
         np.zeros((replicas, entries), np.int64),
         np.zeros((replicas, processes), np.int64),
         np.zeros((replicas, slots), np.int64),
-        np.zeros((replicas, lone, slots)),
-        np.zeros((replicas, lone, slots >> LONE_BITS)),
+        np.zeros((replicas, unary, slots)),
+        np.zeros((replicas, unary, slots >> UNARY_BITS)),
         np.zeros((replicas, BY_FACTOR + processes)),
     )
 

@@ -62,7 +62,7 @@ class Store(NamedTuple):
 
 
 @piece
-def seize(s, w, place):
+def select(s, w, place):
     """Make a particle the one that vanishes."""
     s.count[FIRST] = place
 
@@ -158,7 +158,7 @@ def pieces_of(
         prepare,
         _make_double(store.double),
         store.pick,
-        seize,
+        select,
         store.visit,
         burst,
     )

@@ -12,7 +12,7 @@ from smolux.jit.compile import piece
 
 from . import rng
 from .slots import slot_of, slot_top
-from .state import LONE_BITS
+from .state import UNARY_BITS
 
 
 @piece
@@ -26,10 +26,10 @@ def slots_with(c, bits):
     low, high : int
         Slots by which single particles are counted.
     """
-    first = slot_of(slot_top(c - 1, LONE_BITS) + 1, bits)
-    last = slot_of(slot_top(c, LONE_BITS), bits)
-    low = slot_of(slot_top(first - 1, bits) + 1, LONE_BITS)
-    return first, last, low, slot_of(slot_top(last, bits), LONE_BITS)
+    first = slot_of(slot_top(c - 1, UNARY_BITS) + 1, bits)
+    last = slot_of(slot_top(c, UNARY_BITS), bits)
+    low = slot_of(slot_top(first - 1, bits) + 1, UNARY_BITS)
+    return first, last, low, slot_of(slot_top(last, bits), UNARY_BITS)
 
 
 @piece
@@ -44,5 +44,5 @@ def largest_rate(s, r, low, high):
 @piece
 def takes(s, r, size, largest):
     """Whether a particle is taken, with a chance of the bound in its slot by the `largest`."""
-    bound = s.most[r, slot_of(size, LONE_BITS)]
+    bound = s.most[r, slot_of(size, UNARY_BITS)]
     return bound >= largest or rng.uniform(s.rng) * largest < bound

@@ -27,7 +27,7 @@ _WHOLE = 1e-9
 def make_rate(
     rate: Callable[..., Any],
     weight: Callable[..., Any],
-    factor: Callable[..., Any] | None,
+    rate_ratio: Callable[..., Any] | None,
     own: int,
 ) -> Callable[..., Any]:
     """Bind the simulated rate.
@@ -38,11 +38,11 @@ def make_rate(
         The compiled rate of the kernel, which takes the first `own` parameters.
     weight : callable
         ``weight(size, *q)``, plain, with the other parameters.
-    factor : callable, optional
-        ``factor(i, j, *q)``, plain: a short form of what the rate is multiplied by.
+    rate_ratio : callable, optional
+        ``rate_ratio(i, j, *q)``, plain: a short form of what the rate is multiplied by.
     own : int
     """
-    inner = user_piece(weight if factor is None else factor)
+    inner = user_piece(weight if rate_ratio is None else rate_ratio)
 
     @piece
     def short(i, j, *p):
@@ -54,7 +54,7 @@ def make_rate(
         top = max(one, two, float(inner(i + j, *p[own:])))
         return rate(i, j, *p[:own]) * (top / (one * two))
 
-    return general if factor is None else short
+    return general if rate_ratio is None else short
 
 
 def make_weight(weight: Callable[..., Any], own: int) -> Callable[..., Any]:

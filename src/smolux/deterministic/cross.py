@@ -24,7 +24,7 @@ _BUNCH_PARLETT = 0.6404
 
 
 @dataclass(frozen=True)
-class Factors:
+class LowRankFactors:
     """A kernel as ``K(i, j) = (i + j)**power sum_rs core[r, s] rows[r, i] rows[s, j]``.
 
     Attributes
@@ -66,9 +66,9 @@ class Factors:
         return values
 
 
-def given_factors(sample: Sample) -> Factors | None:
+def given_factors(sample: Sample) -> LowRankFactors | None:
     """Return the exact factors that a law gives, each different row once; None if it gives none."""
-    pair = sample.kernel.factors(np.arange(1.0, sample.largest + 1.0))
+    pair = sample.kernel.low_rank_factors(np.arange(1.0, sample.largest + 1.0))
     if pair is None:
         return None
     rows: list[Float] = []
@@ -83,7 +83,7 @@ def given_factors(sample: Sample) -> Factors | None:
     for (r, a), (s, b) in zip(*weights, strict=True):
         core[r, s] += 0.5 * a * b
         core[s, r] += 0.5 * a * b
-    return sample.tried(Factors(np.array(rows), core))
+    return sample.tried(LowRankFactors(np.array(rows), core))
 
 
 def _find(rows: list[Float], row: Float) -> tuple[int, float]:
@@ -99,7 +99,7 @@ def _find(rows: list[Float], row: Float) -> tuple[int, float]:
 
 def cross_approximation(
     sample: Sample, tolerance: float, power: float = 0.0, max_rank: int = MAX_RANK
-) -> Factors | None:
+) -> LowRankFactors | None:
     """Find low-rank factors of a symmetric kernel from few of its entries.
 
     Pivots come from the full matrix on a few hundred sizes, spread evenly in ``log k``: the largest
@@ -120,7 +120,7 @@ def cross_approximation(
 
     Returns
     -------
-    Factors or None
+    LowRankFactors or None
         With an `error` above ten tolerances if they miss entries; None if the rank is too large
         at once.
 
@@ -137,7 +137,9 @@ def cross_approximation(
         if blocks is None:
             break
         rows, core = _extend(kernel, nodes, blocks, largest, power)
-        found = sample.tried(Factors(*_recompress(kernel, rows, core, tolerance, power), power))
+        found = sample.tried(
+            LowRankFactors(*_recompress(kernel, rows, core, tolerance, power), power)
+        )
         if found.error <= 10.0 * tolerance:
             break
         # sizes between the nodes matter: let those with the largest errors be nodes too
@@ -146,7 +148,7 @@ def cross_approximation(
     return found
 
 
-def interpolation(sample: Sample, tolerance: float = 1e-13) -> Factors | None:
+def interpolation(sample: Sample, tolerance: float = 1e-13) -> LowRankFactors | None:
     """Interpolate a kernel in the logarithms of both sizes, by polynomials at Chebyshev points.
 
     Of higher rank than a cross approximation, but free of its rounding: close to machine accuracy
@@ -161,7 +163,7 @@ def interpolation(sample: Sample, tolerance: float = 1e-13) -> Factors | None:
 
     Returns
     -------
-    Factors or None
+    LowRankFactors or None
         None if the law is not smooth enough.
     """
     x = np.log(np.arange(1.0, sample.largest + 1.0))
@@ -179,7 +181,7 @@ def interpolation(sample: Sample, tolerance: float = 1e-13) -> Factors | None:
         at_node = hit.any(axis=0)
         rows[:, at_node] = hit[:, at_node]
         sizes = np.exp(nodes)
-        factors = sample.tried(Factors(rows, sample.kernel(sizes[:, None], sizes[None, :])))
+        factors = sample.tried(LowRankFactors(rows, sample.kernel(sizes[:, None], sizes[None, :])))
         if found is None or not found.error <= factors.error:
             found = factors
         if found.error <= tolerance:

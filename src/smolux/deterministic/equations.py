@@ -197,7 +197,7 @@ class Equations:
 
     def loss(self, t: float, n: Float) -> Float:
         """Return the rate at which a particle of each size vanishes in all, shape (M,)."""
-        return self.encounters.loss(self._weights(t)[0], n) + self.lone_losses(t)
+        return self.encounters.loss(self._weights(t)[0], n) + self.unary_losses(t)
 
     def gain_by(self, t: float, n: Float, count: int) -> Float:
         """Return how particles merge with those of the sizes ``1 .. count``, shape (M, count)."""
@@ -221,9 +221,9 @@ class Equations:
             missing = self.mass - float(n @ self.sizes)
             for weight, gel in zip(losses, self._gel, strict=True):
                 loss = loss + weight * gel * missing
-        return loss + self.lone_losses(t), self.encounters.merging_by(gains, n, count)
+        return loss + self.unary_losses(t), self.encounters.merging_by(gains, n, count)
 
-    def lone_losses(self, t: float) -> Float:
+    def unary_losses(self, t: float) -> Float:
         """Return the rate at which a particle of each size vanishes by itself, shape (M,)."""
         total, at = np.zeros(self.count), np.array([t])
         for p, term in enumerate(self._terms):

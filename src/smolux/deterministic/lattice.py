@@ -38,9 +38,9 @@ class _OnMultiples(Kernel):
         """See `Kernel.bounds`."""
         return self.kernel.bounds(*(self.unit * np.asarray(side, float) for side in box))
 
-    def factors(self, sizes: Float) -> Any:
-        """See `Kernel.factors`."""
-        return self.kernel.factors(self.unit * sizes)
+    def low_rank_factors(self, sizes: Float) -> Any:
+        """See `Kernel.low_rank_factors`."""
+        return self.kernel.low_rank_factors(self.unit * sizes)
 
     @property
     def singled_out(self) -> Float:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from .cross import Factors
+from .cross import LowRankFactors
 from .tilt import Tilt, Tilts
 
 Float = NDArray[np.float64]
@@ -19,7 +19,7 @@ _GROWN = 1e3
 
 
 class LowRank:
-    """Factors and real FFT, ``O(M R log M)``.
+    """Low-rank factors and real FFT, ``O(M R log M)``.
 
     The gain is one quadratic form of the transforms of ``rows[r] * n``: R forward transforms and
     one back. The rounding of transforms is the same for every size. To keep it below small
@@ -28,7 +28,7 @@ class LowRank:
 
     Parameters
     ----------
-    gain, loss : Factors
+    gain, loss : LowRankFactors
         Of the kernel; the same unless ``gain.power`` is not zero.
     tolerance : float
         Of the kernel; rounding is kept below, if it can be.
@@ -42,7 +42,7 @@ class LowRank:
 
     name = "low-rank"
 
-    def __init__(self, gain: Factors, loss: Factors, tolerance: float = 1e-9) -> None:
+    def __init__(self, gain: LowRankFactors, loss: LowRankFactors, tolerance: float = 1e-9) -> None:
         self._gain, self._loss = gain, loss
         self.rank, self.error = gain.rank, max(gain.error, loss.error)
         self.largest = gain.rows.shape[1]
@@ -125,7 +125,7 @@ class LowRank:
 class _Part:
     """The gain by pairs of which the larger size is in a range, with its own tilt."""
 
-    def __init__(self, gain: Factors, tilt: Tilt) -> None:
+    def __init__(self, gain: LowRankFactors, tilt: Tilt) -> None:
         self.tilt, self._core = tilt, gain.core
         low, high = tilt.low, tilt.high
         end = 2 * high

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from smolux.errors import InputError
 from smolux.kernels.base import Kernel
 
-from .cross import Factors, cross_approximation, given_factors, interpolation
+from .cross import LowRankFactors, cross_approximation, given_factors, interpolation
 from .low_rank import LowRank
 from .trial import Sample, values
 
@@ -233,7 +233,7 @@ class OperatorFactory:
             self.notes.append(text)
 
 
-def _miss(kernel: Kernel, factors: Factors) -> str:
+def _miss(kernel: Kernel, factors: LowRankFactors) -> str:
     """Say where factors are wrong."""
     i, j = factors.worst
     found = float(factors(np.array([i]), np.array([j]))[0])

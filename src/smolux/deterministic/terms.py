@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from smolux.model import Model
-from smolux.processes.base import LoneProcess, Process
+from smolux.processes.base import Process, UnaryProcess
 from smolux.processes.daughters import Debris, Detached, Merged, Nothing, Split
 from smolux.processes.source import Source
 
@@ -241,7 +241,7 @@ def term_of(process: Process, sizes: Float) -> Term:
             return FallingApart(daughters, len(sizes))
         case Split():
             return Splitting(Splits(daughters.law, len(sizes)))
-    if isinstance(process, LoneProcess):
+    if isinstance(process, UnaryProcess):
         match daughters:
             case Nothing():
                 return Leaving(process.rates(sizes), sizes)

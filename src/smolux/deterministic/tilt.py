@@ -60,7 +60,7 @@ class Tilts:
     Parameters
     ----------
     rows, core : ndarray of shape (R, M) and (R, R)
-        Factors of the kernel.
+        Low-rank factors of the kernel.
     power : float
         The sums are multiplied by ``k**power``.
     """

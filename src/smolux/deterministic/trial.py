@@ -14,7 +14,7 @@ from smolux.kernels.base import Kernel
 from smolux.kernels.check import verdict
 
 if TYPE_CHECKING:
-    from .cross import Factors
+    from .cross import LowRankFactors
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -75,11 +75,11 @@ class Sample:
         floor = FLOOR * max(float(self._exact.max()), 1e-300)
         self._scale = self._exact + floor
 
-    def errors(self, factors: Factors) -> Float:
+    def errors(self, factors: LowRankFactors) -> Float:
         """Return the errors of factors relative to the kernel."""
         return np.abs(factors(self.i, self.j) - self._exact) / self._scale
 
-    def tried(self, factors: Factors) -> Factors:
+    def tried(self, factors: LowRankFactors) -> LowRankFactors:
         """Return factors with the largest error that was found, and where."""
         errors = self.errors(factors)
         worst = int(np.argmax(errors))

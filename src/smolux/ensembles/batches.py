@@ -24,7 +24,7 @@ from smolux.methods.base import Method
 from smolux.model import Model
 from smolux.runtime.progress import Progress
 from smolux.settings import Settings
-from smolux.settings.target_error import FEWEST, Goal, named
+from smolux.settings.target_error import Target, named
 from smolux.stochastic.observe import observable
 from smolux.stochastic.plan import Plan
 from smolux.stochastic.planning import decided
@@ -78,7 +78,7 @@ class Sampler:
 
     def __init__(self, plan: Plan, observables: Sequence[str]) -> None:
         self.plan = plan
-        self.goals = [Goal(name, 0.5, FEWEST, FEWEST) for name in observables]
+        self.targets = [Target(name) for name in observables]
         first = Group.start(plan, 0, 1)
         first.compile()
         first.advance(lambda: False)
@@ -136,7 +136,7 @@ class Sampler:
         group.advance(stop)
         group.codes[1:] = BUDGET
         group.advance(stop)
-        found = [observable(self.plan, goal, [group])[0] for goal in self.goals]
+        found = [observable(self.plan, target, [group])[0] for target in self.targets]
         return np.stack(found, axis=1)
 
     def batch(self, first: int, count: int, stop: Callable[[], bool]) -> Batch:

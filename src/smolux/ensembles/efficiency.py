@@ -242,15 +242,16 @@ def _reference(sampler: Sampler, names: Sequence[str], exact: Any) -> tuple[Floa
             raise InputError(
                 f"exact: must have the shape {shape}, a row of values in time for each observable"
             ) from None
-    goals = sampler.goals
+    targets = sampler.targets
     values = np.full(shape, np.nan)
     solution = solutions.solution(plan.model)
     if solution is not None:
-        for row, goal in zip(values, goals, strict=True):
-            if goal.size is not None:
-                row[:] = solution.densities(plan.times, [goal.size])[:, 0]
-            elif goal.target != "largest":
-                row[:] = solution.moment(plan.times, goal.order or 0.0, gel=goal.order is not None)
+        for row, target in zip(values, targets, strict=True):
+            if target.size is not None:
+                row[:] = solution.densities(plan.times, [target.size])[:, 0]
+            elif target.target != "largest":
+                moment = target.order is not None
+                row[:] = solution.moment(plan.times, target.order or 0.0, gel=moment)
         return values, "exact solution"
     reacts = plan.physics.kernel.gels and plan.model.only_aggregates
     gel: dict[str, Any] = {"gel": "reacts"} if reacts else {}
@@ -258,12 +259,12 @@ def _reference(sampler: Sampler, names: Sequence[str], exact: Any) -> tuple[Floa
         ds = solve(plan.model, plan.times, orders=plan.orders, sizes=plan.sizes, **gel)
     except SolverError as error:
         return values, f"none: {error}"
-    for row, goal in zip(values, goals, strict=True):
-        if goal.size is not None:
-            row[:] = ds["n"].sel(size=goal.size).values.ravel()
-        elif goal.order is not None:
-            row[:] = ds["moment"].sel(order=goal.order).values.ravel()
-        elif goal.target == "number_density":
+    for row, target in zip(values, targets, strict=True):
+        if target.size is not None:
+            row[:] = ds["n"].sel(size=target.size).values.ravel()
+        elif target.order is not None:
+            row[:] = ds["moment"].sel(order=target.order).values.ravel()
+        elif target.target == "number_density":
             row[:] = ds["number_density"].values.ravel()
     return values, "rate equations"
 

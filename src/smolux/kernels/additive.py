@@ -56,8 +56,8 @@ class Additive(Kernel):
         """See `Kernel.bounds`; the law grows with either size."""
         return corners(self, (a, c), (b, d))
 
-    def factors(self, sizes: Float) -> tuple[Float, Float]:
-        """See `Kernel.factors`; rank 2."""
+    def low_rank_factors(self, sizes: Float) -> tuple[Float, Float]:
+        """See `Kernel.low_rank_factors`; rank 2."""
         one = np.ones(len(sizes))
         return self.scale * np.array([sizes, one]), np.array([one, sizes])
 

@@ -172,7 +172,7 @@ class Kernel:
         """
         return Interval(*self.bounds(i.lo, i.hi, j.lo, j.hi))
 
-    def factors(self, sizes: Float) -> tuple[Float, Float] | None:
+    def low_rank_factors(self, sizes: Float) -> tuple[Float, Float] | None:
         """Factors ``u, v`` of shape (rank, sizes), ``K(i, j) = sum_r u[r, i] v[r, j]``, or None.
 
         Only exact, finite-rank laws answer; for others the solver finds a cross approximation.

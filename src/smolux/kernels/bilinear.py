@@ -111,8 +111,8 @@ class Bilinear(Kernel):
         """See `Kernel.bounds`; the law grows with either size."""
         return corners(self, (a, c), (b, d))
 
-    def factors(self, sizes: Float) -> tuple[Float, Float]:
-        """See `Kernel.factors`; rank 2."""
+    def low_rank_factors(self, sizes: Float) -> tuple[Float, Float]:
+        """See `Kernel.low_rank_factors`; rank 2."""
         one = np.ones(len(sizes))
         left = np.array([one + self.A * sizes, self.A + self.B * sizes])
         return self.scale * left, np.array([one, sizes])

@@ -91,8 +91,8 @@ class Brownian(Kernel):
         near, far = ratios(a, b, c, d)
         return widen(self(near, 1.0), self(far, 1.0))
 
-    def factors(self, sizes: Float) -> tuple[Float, Float]:
-        """See `Kernel.factors`; rank 3."""
+    def low_rank_factors(self, sizes: Float) -> tuple[Float, Float]:
+        """See `Kernel.low_rank_factors`; rank 3."""
         power = np.asarray(sizes, float) ** (1.0 / self.dimension)
         one = np.ones(len(power))
         return self.scale * np.array([2 * one, power, 1 / power]), np.array([one, 1 / power, power])

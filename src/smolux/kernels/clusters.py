@@ -120,8 +120,8 @@ class Clusters(Kernel):
         j = np.clip(ratio * a, c, d)
         return widen(self(np.clip(ratio * j, a, b), j), upper)
 
-    def factors(self, sizes: Float) -> tuple[Float, Float]:
-        """See `Kernel.factors`; rank 3."""
+    def low_rank_factors(self, sizes: Float) -> tuple[Float, Float]:
+        """See `Kernel.low_rank_factors`; rank 3."""
         sizes = np.asarray(sizes, float)
         power, one = sizes ** (1.0 / self.dimension), np.ones(len(sizes))
         more = sizes**self.exponent

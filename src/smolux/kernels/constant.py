@@ -58,8 +58,8 @@ class Constant(Kernel):
         value = np.full(np.broadcast(a, b, c, d).shape, float(self.scale))
         return value, value.copy()
 
-    def factors(self, sizes: Float) -> tuple[Float, Float]:
-        """See `Kernel.factors`; rank 1."""
+    def low_rank_factors(self, sizes: Float) -> tuple[Float, Float]:
+        """See `Kernel.low_rank_factors`; rank 1."""
         one = np.ones((1, len(sizes)))
         return self.scale * one, one
 

@@ -64,8 +64,8 @@ class GeneralizedBrownian(Kernel):
         near, far = ratios(a, b, c, d)
         return widen(self(near, 1.0), self(far, 1.0))
 
-    def factors(self, sizes: Float) -> tuple[Float, Float]:
-        """See `Kernel.factors`; rank 2."""
+    def low_rank_factors(self, sizes: Float) -> tuple[Float, Float]:
+        """See `Kernel.low_rank_factors`; rank 2."""
         power = np.asarray(sizes, float) ** self.a
         return self.scale * np.array([power, 1 / power]), np.array([1 / power, power])
 

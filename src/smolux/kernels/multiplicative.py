@@ -62,8 +62,8 @@ class Multiplicative(Kernel):
         """See `Kernel.bounds`; the law grows with either size."""
         return corners(self, (a, c), (b, d))
 
-    def factors(self, sizes: Float) -> tuple[Float, Float]:
-        """See `Kernel.factors`; rank 1."""
+    def low_rank_factors(self, sizes: Float) -> tuple[Float, Float]:
+        """See `Kernel.low_rank_factors`; rank 1."""
         sizes = np.asarray(sizes, float)[None]
         return self.scale * sizes, sizes
 

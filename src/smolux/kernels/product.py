@@ -71,8 +71,8 @@ class Product(Kernel):
         """See `Kernel.bounds`; the law is monotone."""
         return corners(self, (a, c), (b, d)) if self.mu >= 0 else corners(self, (b, d), (a, c))
 
-    def factors(self, sizes: Float) -> tuple[Float, Float]:
-        """See `Kernel.factors`; rank 1."""
+    def low_rank_factors(self, sizes: Float) -> tuple[Float, Float]:
+        """See `Kernel.low_rank_factors`; rank 1."""
         power = (np.asarray(sizes, float) ** self.mu)[None]
         return self.scale * power, power
 

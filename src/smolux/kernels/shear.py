@@ -112,8 +112,8 @@ class Shear(Kernel):
         """See `Kernel.bounds`; the law grows with either size."""
         return corners(self, (a, c), (b, d))
 
-    def factors(self, sizes: Float) -> tuple[Float, Float]:
-        """See `Kernel.factors`; rank 4, by the binomial theorem."""
+    def low_rank_factors(self, sizes: Float) -> tuple[Float, Float]:
+        """See `Kernel.low_rank_factors`; rank 4, by the binomial theorem."""
         sizes = np.asarray(sizes, float)
         x, one = np.cbrt(sizes), np.ones(len(sizes))
         left = np.array([sizes, 3 * x * x, 3 * x, one])

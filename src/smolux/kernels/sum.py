@@ -163,9 +163,9 @@ class Sum(MadeOfKernels):
             first = first + other
         return first
 
-    def factors(self, sizes: Float) -> tuple[Float, Float] | None:
-        """See `Kernel.factors`; known if those of all terms are."""
-        found = [(number, kernel.factors(sizes)) for number, kernel in self.parts]
+    def low_rank_factors(self, sizes: Float) -> tuple[Float, Float] | None:
+        """See `Kernel.low_rank_factors`; known if those of all terms are."""
+        found = [(number, kernel.low_rank_factors(sizes)) for number, kernel in self.parts]
         if any(factors is None for _, factors in found):
             return None
         pairs = [(number * u, v) for number, (u, v) in found]  # type: ignore[misc]

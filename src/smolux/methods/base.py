@@ -117,29 +117,29 @@ class Method:
             np.concatenate((counted[small], counts)).astype(np.int64),
         )
 
-    def split(self, work: Any, state: State, parts: int, copies: int, words: Words) -> list[Any]:
-        """Put every particle of a store of one replica `copies` times into one of several piles.
+    def split(self, work: Any, state: State, number: int, copies: int, words: Words) -> list[Any]:
+        """Put every particle of a store of one replica `copies` times into one of several parts.
 
-        Each pile is as likely as the others, and decided by the random `words` alone.
+        Each part is as likely as the others, and decided by the random `words` alone.
         """
         sizes, counts = self.population(work, state, 0)
         rng = np.random.default_rng(words)
-        shares = rng.multinomial(copies * counts, np.full(parts, 1 / parts))
+        shares = rng.multinomial(copies * counts, np.full(number, 1 / number))
         return [(sizes[mine > 0], mine[mine > 0]) for mine in shares.T]
 
-    def collect(self, rates: Rates, piles: list[Any], state: State, mass: int) -> Any:
-        """Return the work arrays of one replica with what `split` has put into these piles."""
-        sizes, counts = merged(piles)
+    def collect(self, rates: Rates, parts: list[Any], state: State, mass: int) -> Any:
+        """Return the work arrays of one replica with what `split` has put into these parts."""
+        sizes, counts = merged(parts)
         if not sizes.size:  # all have left: a size of which there is none, as in an empty start
             sizes, counts = np.ones(1, np.int64), np.zeros(1, np.int64)
         return self.new_work(rates, [(sizes, counts)], state, mass)
 
-    def learnt(self, work: Any, state: State) -> Any:
+    def carried(self, work: Any, state: State) -> Any:
         """Return what was found out so far that holds for other stores of one replica, or None."""
         return None
 
-    def use(self, work: Any, state: State, learnt: list[Any]) -> None:
-        """Take over what `learnt` has returned for other stores with the same rates."""
+    def carry_over(self, work: Any, state: State, carried: list[Any]) -> None:
+        """Take over what `carried` has returned for other stores with the same rates."""
 
     def bytes_per_replica(self, particles: int) -> int:
         """Estimate the memory of one replica at its start."""

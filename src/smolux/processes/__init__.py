@@ -1,7 +1,7 @@
 """What happens to particles, in pairs, alone, or from outside: one file per mechanism."""
 
 from .aggregation import Aggregation
-from .base import LoneProcess, PairProcess, Process
+from .base import PairProcess, Process, UnaryProcess
 from .disruption import CollisionalFragmentation
 from .evaporation import Evaporation
 from .fragmentation import Fragmentation
@@ -26,10 +26,10 @@ __all__ = [
     "CollisionalFragmentation",
     "Evaporation",
     "Fragmentation",
-    "LoneProcess",
     "PairProcess",
     "Process",
     "Removal",
     "Shattering",
     "Source",
+    "UnaryProcess",
 ]

@@ -24,7 +24,7 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Process:
-    """Something that changes the population; see `PairProcess`, `LoneProcess` and `Source`.
+    """Something that changes the population; see `PairProcess`, `UnaryProcess` and `Source`.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class PairProcess(Process):
 
 
 @dataclass(frozen=True)
-class LoneProcess(Process):
+class UnaryProcess(Process):
     """What happens to a particle by itself, at a rate that depends on its size.
 
     The particle vanishes; `outcome` names what appears.
@@ -186,12 +186,12 @@ class RatedBySize(Varying):
 
     @property
     def law(self) -> Callable[..., Any]:
-        """See `LoneProcess.law`."""
+        """See `UnaryProcess.law`."""
         return self.of_size.rate
 
     @property
     def parameters(self) -> tuple[Any, ...]:
-        """See `LoneProcess.parameters`."""
+        """See `UnaryProcess.parameters`."""
         return self.of_size.arguments
 
 

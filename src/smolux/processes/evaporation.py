@@ -11,7 +11,7 @@ import numpy as np
 from smolux.checks import is_number
 from smolux.errors import InputError
 
-from .base import Float, LoneProcess, RatedBySize
+from .base import Float, RatedBySize, UnaryProcess
 from .daughters import Detached
 
 
@@ -25,7 +25,7 @@ def _evaporate(k: int, part: int, sizes: Any, counts: Any) -> int:
 
 
 @dataclass(frozen=True)
-class Evaporation(RatedBySize, LoneProcess):
+class Evaporation(RatedBySize, UnaryProcess):
     """Particles lose monomers: ``(k) -> (k - 1) + (1)`` at the rate ``E_k``, for k from 2 on.
 
     ``dn_k/dt = E_{k+1} n_{k+1} - E_k n_k`` for k > 1, and
@@ -64,12 +64,12 @@ class Evaporation(RatedBySize, LoneProcess):
         return 2
 
     def rates(self, sizes: Float) -> Float:
-        """See `LoneProcess.rates`."""
+        """See `UnaryProcess.rates`."""
         return np.where(sizes > 1.0, self.of_size(sizes), 0.0)
 
     @property
     def daughters(self) -> Detached:
-        """See `LoneProcess.daughters`."""
+        """See `UnaryProcess.daughters`."""
         return Detached(1)
 
     @classmethod

@@ -15,7 +15,7 @@ from smolux.kernels.base import Kernel
 from smolux.kernels.numeric import SAFETY
 from smolux.kernels.shared import pair_law
 
-from .base import Float, LoneProcess, Varying
+from .base import Float, UnaryProcess, Varying
 from .daughters import Split
 
 #: splits of a bin that are tried for a bound, and for a mean
@@ -32,7 +32,7 @@ def _split(k: int, part: int, sizes: Any, counts: Any) -> int:
 
 
 @dataclass(frozen=True)
-class Fragmentation(Varying, LoneProcess):
+class Fragmentation(Varying, UnaryProcess):
     """Particles fall into two: ``(i + j) -> (i) + (j)`` at the rate ``F(i, j)``.
 
     As in ``dn_k/dt = sum_j F(k, j) n_{k+j} - n_k sum_{i+j=k} F(i, j) / 2``. A constant F is random
@@ -77,18 +77,18 @@ class Fragmentation(Varying, LoneProcess):
 
     @property
     def law(self) -> Callable[..., Any]:
-        """See `LoneProcess.law`."""
+        """See `UnaryProcess.law`."""
         return self.pairs.rate
 
     @property
     def parameters(self) -> tuple[Any, ...]:
-        """See `LoneProcess.parameters`."""
+        """See `UnaryProcess.parameters`."""
         return self.pairs.parameters
 
     def split_bounds(
         self, low: Float, high: Float, bounds: Callable[..., tuple[Float, Float]]
     ) -> tuple[Float, Float, Float, Any]:
-        """See `LoneProcess.split_bounds`."""
+        """See `UnaryProcess.split_bounds`."""
         (a, b, c, d), widths = _bins(low, high)
         bound = bounds(a, b, c, d)[1]
         finite = np.isfinite(bound)
@@ -104,7 +104,7 @@ class Fragmentation(Varying, LoneProcess):
 
     @property
     def daughters(self) -> Split:
-        """See `LoneProcess.daughters`."""
+        """See `UnaryProcess.daughters`."""
         return Split(self.pairs)
 
 

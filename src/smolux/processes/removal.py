@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from smolux.checks import is_number
 from smolux.errors import InputError, Problem
 
-from .base import Float, LoneProcess, RatedBySize
+from .base import Float, RatedBySize, UnaryProcess
 from .daughters import Nothing
 
 
@@ -18,7 +18,7 @@ def _vanish(k: int, part: int, sizes: Any, counts: Any) -> int:
 
 
 @dataclass(frozen=True)
-class Removal(RatedBySize, LoneProcess):
+class Removal(RatedBySize, UnaryProcess):
     """Particles leave the system: ``(k) -> nothing``, at a rate or as soon as they are too large.
 
     Parameters
@@ -69,10 +69,10 @@ class Removal(RatedBySize, LoneProcess):
             raise InputError(problems)
 
     def rates(self, sizes: Float) -> Float:
-        """See `LoneProcess.rates`."""
+        """See `UnaryProcess.rates`."""
         return self.of_size(sizes)
 
     @property
     def daughters(self) -> Nothing:
-        """See `LoneProcess.daughters`."""
+        """See `UnaryProcess.daughters`."""
         return Nothing()

@@ -11,7 +11,7 @@ from smolux.errors import Problem
 from .arguments import Arguments
 from .kinds import Choice, Flag, Number, Orders, Registered, Text, Times, Whole, setting
 from .population import POPULATIONS
-from .target_error import FEWEST, Goal, named
+from .target_error import FEWEST, StoppingRule, named
 
 if TYPE_CHECKING:
     from smolux.methods.base import Method
@@ -97,11 +97,11 @@ class Settings(Arguments):
         return problems
 
     @property
-    def goal(self) -> Goal | None:
+    def rule(self) -> StoppingRule | None:
         """What replicas are added for, if they are."""
         if self.target_error is None:
             return None
-        return Goal(self.target, self.target_error, self.replicas, self.max_replicas)
+        return StoppingRule(self.target, self.target_error, self.replicas, self.max_replicas)
 
 
 def _too_few(first: int, most: int | None) -> list[str]:

@@ -25,23 +25,16 @@ TARGETS = ("number_density", "largest", "M2", "n_5")
 
 
 @dataclass(frozen=True)
-class Goal:
-    """As many replicas as make the 95 % interval of an observable short enough.
+class Target:
+    """An observable that intervals or efficiencies are of.
 
     Attributes
     ----------
     target : str
         ``number_density``, ``largest``, ``M<order>`` or ``n_<size>``.
-    error : float
-        Half width of the interval over the mean that is wanted, at every output time.
-    first, most : int
-        Pilots at the start, and replicas of the result at the least; replicas at the most.
     """
 
     target: str
-    error: float
-    first: int
-    most: int
 
     @property
     def order(self) -> float | None:
@@ -55,8 +48,25 @@ class Goal:
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """How near a goal is.
+class StoppingRule(Target):
+    """As many replicas as make the 95 % interval of an observable short enough.
+
+    Attributes
+    ----------
+    error : float
+        Half width of the interval over the mean that is wanted, at every output time.
+    first, most : int
+        Pilots at the start, and replicas of the result at the least; replicas at the most.
+    """
+
+    error: float
+    first: int
+    most: int
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """How near the target error is.
 
     Attributes
     ----------
@@ -65,7 +75,7 @@ class Verdict:
     at : int
         The output time of it.
     needed : float
-        Replicas that will be about enough, of which no more than `Goal.most` are run.
+        Replicas that will be about enough, of which no more than `StoppingRule.most` are run.
     following : int
         Replicas to have before the next look; as many as there are if it is over.
     """
@@ -92,7 +102,7 @@ class Trial:
     replicas: int
 
 
-def plan_replicas(goal: Goal, values: Float, moved: NDArray[np.bool_]) -> Trial:
+def plan_replicas(rule: StoppingRule, values: Float, moved: NDArray[np.bool_]) -> Trial:
     """Say how many replicas it takes, from pilots that will be no part of the result.
 
     Then their number does not depend on the values of the result, whose mean has no bias and whose
@@ -101,7 +111,7 @@ def plan_replicas(goal: Goal, values: Float, moved: NDArray[np.bool_]) -> Trial:
 
     Parameters
     ----------
-    goal : Goal
+    rule : StoppingRule
     values : ndarray of shape (R, T)
         The observable in the pilots.
     moved : ndarray of bool, shape (T,)
@@ -112,23 +122,23 @@ def plan_replicas(goal: Goal, values: Float, moved: NDArray[np.bool_]) -> Trial:
     C. Stein, Ann. Math. Stat. 16, 243 (1945), doi:10.1214/aoms/1177731088, for two stages.
     """
     pilots = len(values)
-    verdict = judge(goal, values, moved)
-    wanted = min(verdict.needed, goal.most)
-    if math.isinf(verdict.error):  # too little was seen to say anything
-        return Trial(min(2 * pilots, goal.most), goal.most)
-    most = max(pilots, math.ceil(_PILOTS * goal.most))
+    assessment = assess(rule, values, moved)
+    wanted = min(assessment.needed, rule.most)
+    if math.isinf(assessment.error):  # too little was seen to say anything
+        return Trial(min(2 * pilots, rule.most), rule.most)
+    most = max(pilots, math.ceil(_PILOTS * rule.most))
     if pilots < math.floor(_PILOTS * wanted) and pilots < most:
         # few pilots overrate what it takes, so they are no more than doubled
         return Trial(min(math.ceil(_PILOTS * wanted), 2 * pilots, most), 0)
-    return Trial(pilots, min(max(math.ceil(wanted), goal.first), goal.most))
+    return Trial(pilots, min(max(math.ceil(wanted), rule.first), rule.most))
 
 
-def judge(goal: Goal, values: Float, moved: NDArray[np.bool_]) -> Verdict:
-    """Say how near a goal is, and with how many replicas to look again.
+def assess(rule: StoppingRule, values: Float, moved: NDArray[np.bool_]) -> Assessment:
+    """Say how near the target error is, and with how many replicas to look again.
 
     Parameters
     ----------
-    goal : Goal
+    rule : StoppingRule
     values : ndarray of shape (R, T)
         The observable.
     moved : ndarray of bool, shape (T,)
@@ -138,30 +148,32 @@ def judge(goal: Goal, values: Float, moved: NDArray[np.bool_]) -> Verdict:
     scale = np.abs(sample.mean)
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = np.where(sample.variance > 0, half_width(sample) / scale, 0.0)
-        needed = np.where(sample.variance > 0, enlarged(sample, goal.error * scale), 0.0)
+        needed = np.where(sample.variance > 0, enlarged(sample, rule.error * scale), 0.0)
     # the same count in every replica, above all none, is luck and no proof of certainty
-    luck = moved & (sample.variance == 0) & ((sample.mean == 0) | (goal.size is not None))
+    luck = moved & (sample.variance == 0) & ((sample.mean == 0) | (rule.size is not None))
     relative[luck] = needed[luck] = np.inf
     at = int(np.argmax(relative))
     error, most = float(relative[at]), float(needed.max())
-    if error <= goal.error:
-        return Verdict(error, at, max(most, float(FEWEST)), replicas)
+    if error <= rule.error:
+        return Assessment(error, at, max(most, float(FEWEST)), replicas)
     following = max(replicas + max(1, replicas // 4), math.ceil(min(most, 2 * replicas)))
-    return Verdict(error, at, max(most, replicas + 1.0), max(replicas, min(following, goal.most)))
+    return Assessment(
+        error, at, max(most, replicas + 1.0), max(replicas, min(following, rule.most))
+    )
 
 
-def shortfall(goal: Goal, verdict: Verdict, replicas: int, time: float) -> str:
-    """Warning of a run that ended before its goal was reached."""
-    if math.isinf(verdict.error):
+def shortfall(rule: StoppingRule, assessment: Assessment, replicas: int, time: float) -> str:
+    """Warning of a run that ended before the target error was reached."""
+    if math.isinf(assessment.error):
         return (
-            f"target_error = {goal.error:g} was not reached with {replicas} replicas: of "
-            f"{goal.target} too little was seen at t = {time:g} to give it an interval; use more "
+            f"target_error = {rule.error:g} was not reached with {replicas} replicas: of "
+            f"{rule.target} too little was seen at t = {time:g} to give it an interval; use more "
             "particles, or leave out this time"
         )
     return (
-        f"target_error = {goal.error:g} was not reached with {replicas} replicas: the 95 % "
-        f"interval of {goal.target} is ±{100 * verdict.error:.2g} % at t = {time:g}; it takes "
-        f"about {verdict.needed:.2g} replicas, or as many times more particles"
+        f"target_error = {rule.error:g} was not reached with {replicas} replicas: the 95 % "
+        f"interval of {rule.target} is ±{100 * assessment.error:.2g} % at t = {time:g}; it takes "
+        f"about {assessment.needed:.2g} replicas, or as many times more particles"
     )
 
 

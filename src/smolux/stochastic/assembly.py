@@ -6,15 +6,15 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any
 
-from smolux.core import beside, rng
+from smolux.core import rng, superposition
 from smolux.core.burst import make_burst
 from smolux.core.fire import make_encounters, make_fire
-from smolux.core.lone import Lone, bind_outcomes, bind_rates, make_ledger, make_lone
 from smolux.core.loop import make_advance, make_loop, make_next_event
 from smolux.core.record import tally_one
 from smolux.core.slots import slot_edges
 from smolux.core.splits import fill, new_splits, slots_beside
-from smolux.core.state import BOTH, LONE_BITS, Parameters
+from smolux.core.state import BOTH, UNARY_BITS, Parameters
+from smolux.core.unary import Unary, bind_outcomes, bind_rates, make_ledger, make_unary
 from smolux.core.weights import (
     make_outcome,
     make_rate,
@@ -30,7 +30,7 @@ from smolux.kernels.constant import Constant
 from smolux.methods.base import Method, Rates
 from smolux.model import Model
 from smolux.processes import Aggregation, Source
-from smolux.processes.base import LoneProcess, PairProcess, Process
+from smolux.processes.base import PairProcess, Process, UnaryProcess
 from smolux.weighting import Number
 from smolux.weighting.base import Weighting
 
@@ -210,37 +210,37 @@ def _rates(processes: Sequence[Process]) -> tuple[Callable[..., Any], ...]:
 _loops: dict[tuple[Any, ...], Any] = {}
 
 
-def _kinds(model: Model) -> tuple[list[PairProcess], list[LoneProcess], list[Source]]:
+def _kinds(model: Model) -> tuple[list[PairProcess], list[UnaryProcess], list[Source]]:
     """Return the processes by their kind."""
     pairs = [p for p in model.processes if isinstance(p, PairProcess)]
-    lone = [p for p in model.processes if isinstance(p, LoneProcess)]
-    return pairs, lone, [p for p in model.processes if isinstance(p, Source)]
+    unary = [p for p in model.processes if isinstance(p, UnaryProcess)]
+    return pairs, unary, [p for p in model.processes if isinstance(p, Source)]
 
 
 def _key(model: Model, method: Method, weighting: Weighting) -> tuple[Any, ...]:
-    pairs, lone, sources = _kinds(model)
-    weighted = [f for f in (weighting.weight, weighting.factor) if f is not None]
+    pairs, unary, sources = _kinds(model)
+    weighted = [f for f in (weighting.weight, weighting.rate_ratio) if f is not None]
     functions = [model.kernel.rate, *weighted]
-    functions += [type(p).outcome for p in pairs] + [type(p).outcome for p in lone]
-    functions += [p.law for p in lone]
+    functions += [type(p).outcome for p in pairs] + [type(p).outcome for p in unary]
+    functions += [p.law for p in unary]
     functions += [p.factor.rate for p in model.processes]
     functions += [law.rate for law in _share_laws(pairs)]
     functions += [law.rate for term in model.kernel.in_time for law in term]
-    shape = len(model.kernel.parameters), len(weighted), len(pairs), len(lone), len(sources)
-    kinds = type(method), len(model.kernel.in_time), *((type(p), p.splits) for p in lone)
+    shape = len(model.kernel.parameters), len(weighted), len(pairs), len(unary), len(sources)
+    kinds = type(method), len(model.kernel.in_time), *((type(p), p.splits) for p in unary)
     return (*kinds, *shape, *map(digest, functions))
 
 
 def uncompilable(model: Model, weighting: Weighting) -> list[str]:
     """Say which functions of the user Numba cannot compile, and what to do."""
-    _, lone, _ = _kinds(model)
+    _, unary, _ = _kinds(model)
     given: list[tuple[str, Callable[..., Any], int]] = [
         *((f"the kernel {k.label}", k.rate, 2 + len(k.parameters)) for _, k in model.kernel.parts),
         *(
             (f"the factor of the kernel in time, {f.text}", f.rate, 1 + len(f.arguments))
             for f, _ in model.kernel.in_time
         ),
-        *((f"the rate of {p.called}", p.law, 2 if p.splits else 1) for p in lone),
+        *((f"the rate of {p.called}", p.law, 2 if p.splits else 1) for p in unary),
         *((f"the rate of {p.called} in time", p.factor.rate, 1) for p in model.processes),
         *(
             (f"the share of {p.called}", p.shared.rate, 2 + len(p.shared.parameters))
@@ -270,14 +270,14 @@ def loop_for(model: Model, method: Method, weighting: Weighting) -> Any:
 
 
 def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
-    pairs, lone, sources = _kinds(model)
+    pairs, unary, sources = _kinds(model)
     own = len(model.kernel.parameters)
     present = pairs or [Aggregation()]
     outcome, factor = _outcomes(tuple(map(type, present))), _factors(_rates(present))
     simulated, tally, weight = _as_float(model.kernel.rate), tally_one, None
     if weighting.weight is not None:
         weight = make_weight(weighting.weight, own)
-        simulated = make_rate(simulated, weighting.weight, weighting.factor, own)
+        simulated = make_rate(simulated, weighting.weight, weighting.rate_ratio, own)
         outcome, tally = make_outcome(outcome, weight), make_tally(weight)
     pieces = method.bind(simulated, tally)
     random = weight is not None or any(type(p).random for p in pairs)
@@ -286,26 +286,28 @@ def _assembled(model: Model, method: Method, weighting: Weighting) -> Any:
     terms = tuple((f.rate, law.rate) for f, law in model.kernel.in_time)
     mixture = _mixture(terms) if terms else None
     encounters = make_encounters(pieces.pair, outcome, factor, len(pairs), share, mixture)
-    if not lone and not sources:
+    if not unary and not sources:
         fire = make_fire(encounters, pieces.update, random)
         burst = None
         if pieces.burst is not None and share is None and mixture is None:
             burst = make_burst(pieces.burst, outcome, len(pairs), random)
         next_event = make_next_event(pieces.draw, burst)
         return make_loop(make_advance(pieces, next_event, fire), pieces.view)
-    about = [Lone(p.law, type(p).outcome, p.least, p.splits, p.opens) for p in lone]
-    shape = len(pairs), len(lone), len(sources)
+    about = [Unary(p.law, type(p).outcome, p.least, p.splits, p.opens) for p in unary]
+    shape = len(pairs), len(unary), len(sources)
     rates = bind_rates(about)
     ledger = make_ledger(rates, lambda tally: method.bind(simulated, tally).visit, shape[1])
-    draw_lone = make_lone(pieces.pick, rates, shape[0], shape[1])
-    choose = beside.make_choice(_factors(_rates(lone)), _factors(_rates(sources)), *shape)
+    draw_unary = make_unary(pieces.pick, rates, shape[0], shape[1])
+    choose = superposition.make_choice(_factors(_rates(unary)), _factors(_rates(sources)), *shape)
     stands = make_stands(weight)
-    kinds = beside.make_kinds(
+    kinds = superposition.make_kinds(
         encounters, bind_outcomes(about), choose, stands, make_replacement(weight), *shape[:2]
     )
-    books = beside.make_books(stands, ledger, rates.known, shape[1])
+    books = superposition.make_books(stands, ledger, rates.known, shape[1])
     fire = make_fire(kinds, pieces.update, True, books)
-    next_event = beside.make_next_event(pieces.draw, ledger.ready, draw_lone, pieces.seize, *shape)
+    next_event = superposition.make_next_event(
+        pieces.draw, ledger.ready, draw_unary, pieces.select, *shape
+    )
     return make_loop(make_advance(pieces, next_event, fire), pieces.view)
 
 
@@ -340,16 +342,16 @@ def factor_parameters(processes: Sequence[Process], kernel: Kernel | None = None
     terms = () if kernel is None else kernel.in_time
     mixture = tuple((factor.parameters, law.parameters) for factor, law in terms)
     pairs = [p for p in processes if isinstance(p, PairProcess)]
-    lone = [p for p in processes if isinstance(p, LoneProcess)]
+    unary = [p for p in processes if isinstance(p, UnaryProcess)]
     return Parameters(
         (*(p.factor.parameters for p in pairs or [Aggregation()]), *((mixture,) if terms else ())),
         tuple(p.parameters for p in pairs or [Aggregation()]),
         tuple(law.parameters for law in _share_laws(pairs)),
         tuple(
             (p.parameters, new_splits(frozen(p.pairs).rigorous)) if p.splits else (p.parameters,)
-            for p in lone
+            for p in unary
         ),
-        tuple(p.factor.parameters for p in lone),
+        tuple(p.factor.parameters for p in unary),
         tuple(p.factor.parameters for p in processes if isinstance(p, Source)),
     )
 
@@ -357,10 +359,10 @@ def factor_parameters(processes: Sequence[Process], kernel: Kernel | None = None
 @timed
 def bound_splits(processes: Sequence[Process], parameters: Parameters, size: int) -> None:
     """Bound the splits of the octave of a size, for which the loop returned `SPLITS`."""
-    slots, edges = slots_beside(size), slot_edges(LONE_BITS).astype(float)
+    slots, edges = slots_beside(size), slot_edges(UNARY_BITS).astype(float)
     low, high = edges[slots], edges[1:][slots] - 1.0
-    lone = [p for p in processes if isinstance(p, LoneProcess)]
-    for process, own in zip(lone, parameters.lone, strict=True):
+    unary = [p for p in processes if isinstance(p, UnaryProcess)]
+    for process, own in zip(unary, parameters.unary, strict=True):
         if process.splits:
             bounds = bounds_of(frozen(process.pairs), Number())
             fill(own[1], slots, *process.split_bounds(low, high, bounds))

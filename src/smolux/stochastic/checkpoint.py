@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from smolux.core.state import State, Tally, Windows
+from smolux.core.state import State, Tally, TimeWindows
 from smolux.errors import InputError
 from smolux.functions.content import frozen
 from smolux.model import Model
@@ -22,7 +22,7 @@ from smolux.settings import Settings, from_plain, plain
 
 from .plan import Plan
 from .replicas import Group
-from .subvolumes import Divided, within
+from .subvolumes import SubvolumeReplica, within
 
 #: what reading a file that is no checkpoint, or half of one, may raise
 _UNREADABLE = (
@@ -31,7 +31,7 @@ _UNREADABLE = (
 
 #: raised whenever the content of a checkpoint changes; columns of state and tally speak for
 #: themselves
-VERSION = 6
+VERSION = 7
 
 
 def _plan_to_dict(plan: Plan) -> dict[str, Any]:
@@ -54,7 +54,7 @@ def _plan_from_dict(given: dict[str, Any], model: Model | None) -> Plan:
     )
 
 
-def save(path: str | Path, plan: Plan, groups: Sequence[Group | Divided]) -> None:
+def save(path: str | Path, plan: Plan, groups: Sequence[Group | SubvolumeReplica]) -> None:
     """Write a checkpoint, whole or not at all; see `smolux.runtime.files.replacing`."""
     if not all(group.intact for group in groups):
         raise InputError("memory ended while sub-volumes were mixed")
@@ -68,7 +68,9 @@ def save(path: str | Path, plan: Plan, groups: Sequence[Group | Divided]) -> Non
         np.savez(f, **arrays)  # type: ignore[arg-type]
 
 
-def _put(arrays: dict[str, np.ndarray], key: str, group: Group | Divided) -> dict[str, Any]:
+def _put(
+    arrays: dict[str, np.ndarray], key: str, group: Group | SubvolumeReplica
+) -> dict[str, Any]:
     """Add the arrays of a group under names that begin with `key`; return the rest."""
     kinds: dict[str, Any] = {"state": group.state, "tally": group.tally, "windows": group.windows}
     if isinstance(group, Group):
@@ -87,13 +89,15 @@ def _put(arrays: dict[str, np.ndarray], key: str, group: Group | Divided) -> dic
         "bounds_seconds": group.bounds_seconds,
         "populations": [len(replica) for replica in group.distribution],
     }
-    if isinstance(group, Divided):
+    if isinstance(group, SubvolumeReplica):
         about |= {"stretch": group.stretch, "length": group.length, "open": list(group.open)}
         about["parts"] = [_put(arrays, f"{key}/{m}", part) for m, part in enumerate(group.parts)]
     return about
 
 
-def load(path: str | Path, model: Model | None = None) -> tuple[Plan, list[Group | Divided]]:
+def load(
+    path: str | Path, model: Model | None = None
+) -> tuple[Plan, list[Group | SubvolumeReplica]]:
     """Read a checkpoint.
 
     Parameters
@@ -142,7 +146,7 @@ def _damaged(path: str | Path, error: Exception) -> InputError:
 
 def _take(
     arrays: dict[str, np.ndarray], key: str, about: dict[str, Any], plan: Plan
-) -> Group | Divided:
+) -> Group | SubvolumeReplica:
     """Make a group of what `_put` has added."""
 
     def part(kind: str) -> dict[str, np.ndarray]:
@@ -161,7 +165,7 @@ def _take(
         "state": State(**part("state")),
         "tally": Tally(**part("tally")),
         "codes": arrays[f"{key}/codes"],
-        "windows": Windows(**part("windows")),
+        "windows": TimeWindows(**part("windows")),
         "distribution": distribution,
         "seconds": about["seconds"],
         "bounds_seconds": about.get("bounds_seconds", 0.0),
@@ -174,4 +178,4 @@ def _take(
         _take(arrays, f"{key}/{m}", each, alone) for m, each in enumerate(about["parts"])
     ]
     stretch = {name: about[name] for name in ("stretch", "length")}
-    return Divided(plan, parts=parts, open=times, **stretch, **common)
+    return SubvolumeReplica(plan, parts=parts, open=times, **stretch, **common)

@@ -20,7 +20,7 @@ from smolux.methods import SizeClass
 from smolux.model import Model
 from smolux.observables import recorded
 from smolux.settings import Settings
-from smolux.settings.target_error import Goal
+from smolux.settings.target_error import Target
 from smolux.weighting import MassFlow, Number, WeightFunction
 from smolux.weighting.base import Weighting
 
@@ -74,11 +74,11 @@ def chosen_weighting(model: Model, settings: Settings) -> tuple[Weighting, str]:
 
     The model is frozen, and the settings have a seed.
     """
-    goal = Goal(settings.target, 0.5, 2, 2)
-    trials = list(_trials(model, settings, goal))
+    target = Target(settings.target)
+    trials = list(_trials(model, settings, target))
     if len(trials) == len(_POWERS):
-        return _compared(goal, trials)
-    return _by_rule(model, goal)
+        return _compared(target, trials)
+    return _by_rule_of_thumb(model, target)
 
 
 def named(power: float) -> Weighting:
@@ -86,7 +86,7 @@ def named(power: float) -> Weighting:
     return {0.0: Number(), 1.0: MassFlow()}.get(power) or WeightFunction(power)
 
 
-def _trials(model: Model, settings: Settings, goal: Goal) -> Iterator[_Trial]:
+def _trials(model: Model, settings: Settings, target: Target) -> Iterator[_Trial]:
     """Run the pilots, as long as they come to their ends."""
     seeds = np.random.SeedSequence(settings.seed, spawn_key=(0, _STREAM)).generate_state(
         len(_POWERS), np.uint64
@@ -97,8 +97,8 @@ def _trials(model: Model, settings: Settings, goal: Goal) -> Iterator[_Trial]:
         settings,
         particles=min(settings.particles, _PARTICLES),
         times=tuple(times[k] for k in some),
-        orders=(goal.order or 0.0,),
-        sizes=max(goal.size or 1, min(settings.sizes, _SIZES)),
+        orders=(target.order or 0.0,),
+        sizes=max(target.size or 1, min(settings.sizes, _SIZES)),
         bins_per_octave=1,
         distribution=False,
         subvolumes=1,
@@ -110,13 +110,13 @@ def _trials(model: Model, settings: Settings, goal: Goal) -> Iterator[_Trial]:
         )
         # in the run itself
         meant = Plan.of(model, settings, method=SizeClass(), weighting=named(power))
-        trial = _trial(given, goal, meant)
+        trial = _trial(given, target, meant)
         if trial is None:
             return
         yield trial
 
 
-def _trial(small: Plan, goal: Goal, meant: Plan) -> _Trial | None:
+def _trial(small: Plan, target: Target, meant: Plan) -> _Trial | None:
     """Run one pilot; None if it takes too long."""
     values, present, events, effort = [], [], 0, 0
     together = max(1, min(_TOGETHER, _OBSERVED // (len(small.times) * small.sizes)))
@@ -127,14 +127,14 @@ def _trial(small: Plan, goal: Goal, meant: Plan) -> _Trial | None:
         # that it came to its end in the last slice says something of the machine, and is left out
         if _effort(group) > _EFFORT:
             return None
-        values.append(observable(small, goal, [group])[0])
+        values.append(observable(small, target, [group])[0])
         present.append(recorded(group.tally, "volume").astype(float))
         events += int(group.state.events.sum())
         if effort > _EFFORT // 2:
             break
     weighting = meant.weighting
-    if goal.size is not None:
-        weight = weighting.weights(np.array([float(goal.size)]))[0]
+    if target.size is not None:
+        weight = weighting.weights(np.array([float(target.size)]))[0]
         present = [weight * volume for volume in present]
     cost = events / (together * len(values)) * event_cost(meant)
     cost *= _POWER_COST if isinstance(weighting, WeightFunction) else 1.0
@@ -145,13 +145,13 @@ def _effort(group: Group) -> int:
     return int(group.state.count[:, (TRIALS, EVENTS)].sum())
 
 
-def _compared(goal: Goal, trials: list[_Trial]) -> tuple[Weighting, str]:
+def _compared(target: Target, trials: list[_Trial]) -> tuple[Weighting, str]:
     """Choose the weighting that is worth most."""
-    worst = _scatter(goal, trials).max(axis=1)
+    worst = _scatter(target, trials).max(axis=1)
     replicas = min(len(trial.values) for trial in trials)
     pilots = f"in pilots of {replicas} replicas or more"
     if not worst.max() > 0.0:
-        return trials[0].weighting, f"{goal.target} has no scatter {pilots}"
+        return trials[0].weighting, f"{target.target} has no scatter {pilots}"
     with np.errstate(divide="ignore"):
         worth = 1.0 / (worst * [trial.cost for trial in trials])
         ratio = worth / worth[0]
@@ -160,11 +160,11 @@ def _compared(goal: Goal, trials: list[_Trial]) -> tuple[Weighting, str]:
         f"{_label(trial.weighting)} {r:.2g}" for trial, r in zip(trials[1:], ratio[1:], strict=True)
     )
     return trials[best].weighting, (
-        f"efficiency for {goal.target} over that of number {pilots}: {others}"
+        f"efficiency for {target.target} over that of number {pilots}: {others}"
     )
 
 
-def _scatter(goal: Goal, trials: list[_Trial]) -> Float:
+def _scatter(target: Target, trials: list[_Trial]) -> Float:
     """Return the variance over the squared mean, for each trial and time.
 
     That of a size that is hardly seen is taken to be that of a count: one over the number that is
@@ -179,12 +179,12 @@ def _scatter(goal: Goal, trials: list[_Trial]) -> Float:
             mean = trial.values.mean(axis=0)
             spread = trial.values.var(axis=0, ddof=1)
             scatter = np.where(spread > 0.0, spread / mean**2, 0.0)
-            if goal.size is not None:
+            if target.size is not None:
                 rare = (trial.values * trial.present).sum(axis=0) < _SEEN
                 expected = 1.0 / (density * trial.present.mean(axis=0))
                 scatter = np.where(rare, expected, scatter)
         found.append(scatter)
-    seen = count > 0.0 if goal.size is not None and count.any() else np.ones(len(count), bool)
+    seen = count > 0.0 if target.size is not None and count.any() else np.ones(len(count), bool)
     return np.array(found)[:, seen]
 
 
@@ -194,11 +194,11 @@ def _label(weighting: Weighting) -> str:
     return weighting.name
 
 
-def _by_rule(model: Model, goal: Goal) -> tuple[Weighting, str]:
+def _by_rule_of_thumb(model: Model, target: Target) -> tuple[Weighting, str]:
     """Choose by the name of the observable alone."""
     sizes, counts = model.initial.sample(1000, 0.5) if model.initial.total else (1, 1)
     mean = float(np.sum(sizes * counts) / np.sum(counts))
-    large = (goal.order or 0.0) > 1.0 or (goal.size or 0.0) > mean
+    large = (target.order or 0.0) > 1.0 or (target.size or 0.0) > mean
     return (MassFlow() if large else Number()), (
         f"a pilot takes more than {_EFFORT:g} events; by rule mass-flow for moments of an order "
         "above 1 and sizes above the mean one at the start, number for all else"

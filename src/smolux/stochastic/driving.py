@@ -18,13 +18,13 @@ from smolux.results import to_dataset
 from smolux.runtime.executors import completed
 from smolux.runtime.progress import Progress
 from smolux.settings import PILOT, Control
-from smolux.settings.target_error import Trial, Verdict, judge, plan_replicas, shortfall
+from smolux.settings.target_error import Assessment, Trial, assess, plan_replicas, shortfall
 
 from . import checkpoint as checkpoints
 from .observe import observable, to_records
 from .plan import Plan, check_memory
 from .replicas import Group
-from .subvolumes import Divided, start
+from .subvolumes import SubvolumeReplica, start
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,12 +35,12 @@ _ROUNDING = 1e-12
 
 
 class Run:
-    """What every way to run has: groups of replicas, a goal, progress, the result."""
+    """What every way to run has: groups of replicas, a stopping rule, progress, the result."""
 
     def __init__(
         self,
         plan: Plan,
-        groups: list[Group | Divided],
+        groups: list[Group | SubvolumeReplica],
         progress: Callable[[Progress], None] | None,
         workers: int,
         planned: float = 0.0,
@@ -50,7 +50,7 @@ class Run:
         self.compile_seconds = 0.0
         #: seconds spent on bounds before there were groups
         self.planned = planned
-        self.verdict: Verdict | None = None
+        self.assessment: Assessment | None = None
         self.remarks: list[str] = []
 
     @property
@@ -59,24 +59,24 @@ class Run:
         return bool(self.groups) and self.groups[0].first >= PILOT
 
     def more(self) -> list[tuple[int, int]]:
-        """Replicas that the goal still needs, when all are done; none if it is reached."""
-        goal, done = self.plan.goal, self.plan.replicas
-        if goal is None:
+        """Replicas that the target error still takes, when all are done; none if it is reached."""
+        rule, done = self.plan.rule, self.plan.replicas
+        if rule is None:
             return []
-        values, moved = observable(self.plan, goal, self.groups)
-        verdict = self.verdict = judge(goal, values, moved)
+        values, moved = observable(self.plan, rule, self.groups)
+        assessment = self.assessment = assess(rule, values, moved)
         if self.piloting:
-            return self._after_pilots(plan_replicas(goal, values, moved))
-        if verdict.following > done and self._widened(verdict.following, done):
+            return self._after_pilots(plan_replicas(rule, values, moved))
+        if assessment.following > done and self._widened(assessment.following, done):
             for group in self.groups:
                 group.release()
             return self.plan.groups(self.workers, done)
-        if verdict.error > goal.error:
-            time_ = self.plan.times[verdict.at]
-            self.remarks.append(shortfall(goal, verdict, done, time_))
-        elif _ROUNDING < verdict.error < 1 / self.plan.particles and goal.target != "largest":
+        if assessment.error > rule.error:
+            time_ = self.plan.times[assessment.at]
+            self.remarks.append(shortfall(rule, assessment, done, time_))
+        elif _ROUNDING < assessment.error < 1 / self.plan.particles and rule.target != "largest":
             self.remarks.append(
-                f"the interval of {goal.target} is no longer than the bias of a finite population "
+                f"the interval of {rule.target} is no longer than the bias of a finite population "
                 f"may be, of the order of 1/particles = {1 / self.plan.particles:g}, and which "
                 "replicas do not reduce: use more particles"
             )
@@ -89,10 +89,10 @@ class Run:
             for group in self.groups:
                 group.release()
             return self.plan.pilots(self.workers, done)
-        assert self.plan.goal is not None
+        assert self.plan.rule is not None
         self.groups = []
-        if not self._widened(trial.replicas or self.plan.goal.most, 0):
-            self.plan = replace(self.plan, replicas=self.plan.goal.first)  # as many as the pilots
+        if not self._widened(trial.replicas or self.plan.rule.most, 0):
+            self.plan = replace(self.plan, replicas=self.plan.rule.first)  # as many as the pilots
         return self.plan.groups(self.workers)
 
     def _widened(self, replicas: int, done: int) -> bool:
@@ -111,14 +111,14 @@ class Run:
         """Tell progress: replicas that are done, parts of them included."""
         if self.progress is None:
             return
-        goal, expected = self.plan.goal, float(self.plan.replicas)
-        if goal is not None and self.verdict is not None:
-            expected = max(expected, min(self.verdict.needed, goal.most))
+        rule, expected = self.plan.rule, float(self.plan.replicas)
+        if rule is not None and self.assessment is not None:
+            expected = max(expected, min(self.assessment.needed, rule.most))
         fraction = min(done / expected, 1.0)
         spent = time.perf_counter() - self.started - self.compile_seconds
         left = spent * (1 - fraction) / fraction if fraction > 0 else np.nan
-        reached = np.nan if self.verdict is None else self.verdict.error
-        wanted = np.nan if goal is None else goal.error
+        reached = np.nan if self.assessment is None else self.assessment.error
+        wanted = np.nan if rule is None else rule.error
         near = f"±{100 * reached:.2g} % of ±{100 * wanted:.2g} %, {self.plan.replicas} replicas"
         self.progress(
             Progress(
@@ -144,8 +144,8 @@ class Run:
         if self.piloting:
             records.attributes["complete"] = False
         records.attributes["wall_seconds"] = time.perf_counter() - self.started
-        if self.verdict is not None and records.attributes["complete"]:
-            records.attributes["reached_error"] = self.verdict.error
+        if self.assessment is not None and records.attributes["complete"]:
+            records.attributes["reached_error"] = self.assessment.error
         records.warnings += [*self.remarks, *(r for r in remarks if r)]
         return to_dataset(self.plan.model, records)
 
@@ -158,13 +158,13 @@ class Run:
         return found
 
 
-class Threads(Run):
+class ThreadRun(Run):
     """Groups of replicas on threads of this process."""
 
     def __init__(
         self,
         plan: Plan,
-        groups: list[Group | Divided],
+        groups: list[Group | SubvolumeReplica],
         control: Control,
         workers: int,
         planned: float = 0.0,
@@ -280,7 +280,7 @@ class Threads(Run):
 
 
 #: what a group came to, and the error that ended it
-Outcome = tuple[Group | Divided, InputError | None]
+Outcome = tuple[Group | SubvolumeReplica, InputError | None]
 
 
 def run_group(plan: Plan, first: int, count: int) -> Outcome:
@@ -301,7 +301,7 @@ def run_group(plan: Plan, first: int, count: int) -> Outcome:
     return group, found
 
 
-class Elsewhere(Run):
+class ExecutorRun(Run):
     """Groups of replicas as tasks of any executor."""
 
     def __init__(
@@ -328,7 +328,7 @@ class Elsewhere(Run):
             If the workers die again and again.
         """
         parts = self.plan.begin(self.workers)
-        found: dict[int, Group | Divided] = {}
+        found: dict[int, Group | SubvolumeReplica] = {}
         try:
             while parts:
                 self._gather(parts, found)
@@ -346,13 +346,18 @@ class Elsewhere(Run):
             raise (self.salvaged(error) if self.groups else error) from None
 
     def _kept(
-        self, parts: list[tuple[int, int]], found: dict[int, Group | Divided], *remarks: str
+        self,
+        parts: list[tuple[int, int]],
+        found: dict[int, Group | SubvolumeReplica],
+        *remarks: str,
     ) -> xr.Dataset | None:
         """Return what workers have sent back; None if that is nothing."""
         self._take_over(parts, found)
         return self.dataset(*remarks) if self.groups else None
 
-    def _take_over(self, parts: list[tuple[int, int]], found: dict[int, Group | Divided]) -> None:
+    def _take_over(
+        self, parts: list[tuple[int, int]], found: dict[int, Group | SubvolumeReplica]
+    ) -> None:
         """Take the groups that were found, and in place of the others some that never began."""
         if self.groups or found:
             self.groups += [
@@ -360,7 +365,9 @@ class Elsewhere(Run):
                 for k, part in enumerate(parts)
             ]
 
-    def _gather(self, parts: list[tuple[int, int]], found: dict[int, Group | Divided]) -> None:
+    def _gather(
+        self, parts: list[tuple[int, int]], found: dict[int, Group | SubvolumeReplica]
+    ) -> None:
         """Run groups; at an error those that have begun are still waited for."""
         tasks = [(self.plan, *part) for part in parts]
         errors: list[InputError] = []
@@ -385,7 +392,7 @@ class Elsewhere(Run):
         if errors:
             raise errors[0]
 
-    def _tell(self, found: dict[int, Group | Divided]) -> None:
+    def _tell(self, found: dict[int, Group | SubvolumeReplica]) -> None:
         groups = [*self.groups, *found.values()]
         events = sum(g.events for g in groups)
         spent = time.perf_counter() - self.started

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from smolux import observables
 from smolux.core.state import AT, DOUBLINGS, HIGHEST
 from smolux.results.records import Records
-from smolux.settings.target_error import Goal
+from smolux.settings.target_error import Target
 
 from .plan import Plan
 from .replicas import Group
-from .subvolumes import Divided
+from .subvolumes import SubvolumeReplica
 from .totals import Totals, attempts_of
 
 Float = NDArray[np.float64]
@@ -25,7 +25,7 @@ Float = NDArray[np.float64]
 class Seen:
     """What groups have seen, by replica and time; NaN where a replica did not come to it."""
 
-    def __init__(self, plan: Plan, groups: Sequence[Group | Divided]) -> None:
+    def __init__(self, plan: Plan, groups: Sequence[Group | SubvolumeReplica]) -> None:
         self.plan, self.groups = plan, groups
 
     def _tallied(self, name: str) -> NDArray[Any]:
@@ -117,7 +117,7 @@ COMPUTED: dict[str, Callable[[Seen], Float]] = {
 _OPEN = ("mass", "mass_in", "mass_out")
 
 
-def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
+def to_records(plan: Plan, groups: Sequence[Group | SubvolumeReplica]) -> Records:
     """Turn counts into densities; output times not reached are NaN.
 
     Parameters
@@ -152,9 +152,9 @@ def to_records(plan: Plan, groups: Sequence[Group | Divided]) -> Records:
 
 
 def observable(
-    plan: Plan, goal: Goal, groups: Sequence[Group | Divided]
+    plan: Plan, target: Target, groups: Sequence[Group | SubvolumeReplica]
 ) -> tuple[Float, NDArray[np.bool_]]:
-    """Return what a goal is about, at all output times of replicas that are done.
+    """Return an observable at all output times of replicas that are done.
 
     Returns
     -------
@@ -163,14 +163,14 @@ def observable(
         Whether anything has happened in any replica.
     """
     seen = Seen(plan, groups)
-    if goal.target == "largest":
+    if target.target == "largest":
         values = seen.scalars[..., HIGHEST]
-    elif goal.size is not None:
-        count = np.concatenate([g.tally.counts[:, :, goal.size] for g in groups])
-        values = count * plan.weighting.stands_for(np.array([float(goal.size)])) / seen.volume
-    elif goal.order is not None:
-        powers = seen.sizes**goal.order * plan.weighting.stands_for(seen.sizes)
-        column = plan.orders.index(goal.order)
+    elif target.size is not None:
+        count = np.concatenate([g.tally.counts[:, :, target.size] for g in groups])
+        values = count * plan.weighting.stands_for(np.array([float(target.size)])) / seen.volume
+    elif target.order is not None:
+        powers = seen.sizes**target.order * plan.weighting.stands_for(seen.sizes)
+        column = plan.orders.index(target.order)
         sums = [g.tally.counts[:, :, 1:] @ powers + g.tally.sums[..., column] for g in groups]
         values = np.concatenate(sums) / seen.volume
     else:
@@ -181,9 +181,9 @@ def observable(
     return values, np.asarray(moved.any(axis=0))
 
 
-def _attributes(plan: Plan, groups: Sequence[Group | Divided]) -> dict[str, object]:
-    goal = plan.goal
-    wanted = {} if goal is None else {"target": goal.target, "target_error": goal.error}
+def _attributes(plan: Plan, groups: Sequence[Group | SubvolumeReplica]) -> dict[str, object]:
+    rule = plan.rule
+    wanted = {} if rule is None else {"target": rule.target, "target_error": rule.error}
     return wanted | {
         "method": plan.method.name,
         "method_reason": plan.reason or "asked for",

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from smolux.core.state import Grid, Windows
+from smolux.core.state import Grid, TimeWindows
 from smolux.errors import InputError
 from smolux.functions.content import frozen
 from smolux.initial import Initial
@@ -19,18 +19,18 @@ from smolux.observables import observed
 from smolux.runtime.resources import available_memory
 from smolux.settings import PILOT, Settings
 from smolux.settings.population import doubles_at
-from smolux.settings.target_error import Goal
+from smolux.settings.target_error import StoppingRule
 from smolux.weighting.base import Weighting
 
 from .assembly import loop_for, rates_for
-from .windows import inflow, windows_for
+from .time_windows import inflow, time_windows_for
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plan(Settings):
     """All that decides the outcome of a stochastic run.
 
-    Its `replicas` are those planned so far: with a goal more are added.
+    Its `replicas` are those planned so far: with a stopping rule more are added.
 
     Attributes
     ----------
@@ -64,9 +64,9 @@ class Plan(Settings):
         return _unpickled, (cloudpickle.dumps(values),)
 
     @property
-    def goal(self) -> Goal | None:
+    def rule(self) -> StoppingRule | None:
         """What replicas are added for, if they are."""
-        return self.asked.goal
+        return self.asked.rule
 
     @cached_property
     def start(self) -> Initial:
@@ -87,12 +87,14 @@ class Plan(Settings):
         return rates_for(self.physics, self.weighting)
 
     @cached_property
-    def _windows(self) -> Windows:
-        return windows_for(self.model.processes, self.times[-1], self.weighting, self.model.kernel)
+    def _windows(self) -> TimeWindows:
+        return time_windows_for(
+            self.model.processes, self.times[-1], self.weighting, self.model.kernel
+        )
 
-    def windows(self) -> Windows:
+    def windows(self) -> TimeWindows:
         """Return bounds of the rate factors, which a run may correct as its own."""
-        return Windows(*(np.array(column) for column in self._windows))
+        return TimeWindows(*(np.array(column) for column in self._windows))
 
     @cached_property
     def loop(self) -> Any:
@@ -131,8 +133,8 @@ class Plan(Settings):
         return observed(np.array(self.times), edges, np.array(orders), before)
 
     def begin(self, workers: int) -> list[tuple[int, int]]:
-        """Return the groups to begin with: pilots if there is a goal, else all replicas."""
-        return self.groups(workers) if self.goal is None else self.pilots(workers)
+        """Return the groups to begin with: pilots if replicas are added, else all replicas."""
+        return self.groups(workers) if self.rule is None else self.pilots(workers)
 
     def pilots(self, workers: int, start: int = 0) -> list[tuple[int, int]]:
         """Split as many pilots as there are replicas, with random numbers of their own."""
@@ -164,7 +166,7 @@ def check_memory(plan: Plan, done: int = 0) -> None:
     grid = plan.grid
     row = 8 * (plan.sizes + len(grid.edges) + len(grid.orders) + 8)
     observations = plan.replicas * len(plan.times) * row
-    # sub-volumes are dealt out anew: what goes from one to the other is there besides
+    # sub-volumes are filled anew: what goes from one to the other is there besides
     mixing = 8 * plan.particles if plan.subvolumes > 1 else 0
     stores = (plan.replicas - done) * plan.method.bytes_per_replica(plan.particles) + mixing
     if observations + stores > 0.9 * available:

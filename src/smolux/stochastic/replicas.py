@@ -44,7 +44,7 @@ from smolux.core.state import (
     Parameters,
     State,
     Tally,
-    Windows,
+    TimeWindows,
     new_state,
     new_tally,
 )
@@ -55,7 +55,7 @@ from smolux.kernels.base import Kernel
 from smolux.kernels.shared import WHOLE, Shared
 from smolux.methods.base import size_of
 from smolux.model import Model
-from smolux.processes.base import LoneProcess, PairProcess, text_of
+from smolux.processes.base import PairProcess, UnaryProcess, text_of
 from smolux.runtime import room
 
 from .assembly import bound_splits, factor_parameters, uncompilable
@@ -78,7 +78,7 @@ class Group:
     work: Any
     tally: Tally
     codes: Int
-    windows: Windows
+    windows: TimeWindows
     distribution: list[list[tuple[Int, Int]]] = field(default_factory=list)
     seconds: float = 0.0
     compile_seconds: float = 0.0
@@ -112,7 +112,7 @@ class Group:
         first: int,
         state: State,
         work: Any,
-        windows: Windows,
+        windows: TimeWindows,
         loop: Any = None,
         parameters: Parameters | None = None,
     ) -> Group:
@@ -157,7 +157,7 @@ class Group:
 
     @property
     def intact(self) -> bool:
-        """Whether it could go on from what it is, see `smolux.stochastic.subvolumes.Divided`."""
+        """Whether it could go on from what it is, see `.subvolumes.SubvolumeReplica`."""
         return True
 
     def compile(self) -> None:
@@ -306,8 +306,8 @@ class Group:
 def empty_state(plan: Plan, rng: Any) -> State:
     """Return the state at the start but for the particles, for as many replicas as streams."""
     processes = plan.model.processes
-    lone = sum(isinstance(p, LoneProcess) for p in processes)
-    state = new_state(rng, len(processes), max(p.entries for p in processes), lone)
+    unary = sum(isinstance(p, UnaryProcess) for p in processes)
+    state = new_state(rng, len(processes), max(p.entries for p in processes), unary)
     state.clock[:, VOLUME] = plan.volume
     state.clock[:, EXTINCT] = np.nan
     return state
@@ -349,7 +349,7 @@ def _bad_rate(model: Model, state: State, r: int) -> str:
     if culprit == 0:
         whose, where = f"the kernel {model.kernel.label}", f"sizes {i} and {j}"
     else:
-        process = [p for p in model.processes if isinstance(p, LoneProcess)][culprit - 1]
+        process = [p for p in model.processes if isinstance(p, UnaryProcess)][culprit - 1]
         whose = f"the rate of {process.called}"
         where = f"fragments {i} and {j}" if j else f"size {i}"
     return (

@@ -22,7 +22,7 @@ from smolux.settings import Control, Settings
 from smolux.weighting.base import Weighting
 
 from . import checkpoint as checkpoints
-from .driving import Elsewhere, Threads
+from .driving import ExecutorRun, ThreadRun
 from .planning import decided
 from .remembered import spent
 from .subvolumes import start
@@ -170,10 +170,10 @@ def simulate(
     planned = spent() - before
     other = control.executor
     if other is not None and not isinstance(other, ThreadPoolExecutor):
-        return told(Elsewhere(plan, other, control.progress, workers_of(other), planned).finish())
+        return told(ExecutorRun(plan, other, control.progress, workers_of(other), planned).finish())
     workers = max(1, cores() // plan.subvolumes)
     groups = [start(plan, *part) for part in plan.begin(workers)]
-    return told(Threads(plan, groups, control, workers, planned).finish())
+    return told(ThreadRun(plan, groups, control, workers, planned).finish())
 
 
 def resume(
@@ -210,4 +210,4 @@ def resume(
     file = Path(checkpoint).expanduser()
     control, (plan, groups) = replace(control, checkpoint=file), checkpoints.load(file, model)
     workers = max(1, cores() // plan.subvolumes)
-    return told(Threads(plan, groups, control, workers, resumed=True).finish())
+    return told(ThreadRun(plan, groups, control, workers, resumed=True).finish())

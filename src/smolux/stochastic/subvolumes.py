@@ -36,7 +36,7 @@ from smolux.core.state import (
     WORST_J,
     State,
     Tally,
-    Windows,
+    TimeWindows,
     bring_together,
     hand_on,
     new_tally,
@@ -57,7 +57,7 @@ _PART, _MIXING, _GUESS = 2, 3, 4
 
 
 @dataclass
-class Divided:
+class SubvolumeReplica:
     """A replica in sub-volumes; has what a `smolux.stochastic.replicas.Group` of one replica has.
 
     A stretch is the time from one mixing to the next. It depends on the state at its start, not on
@@ -70,7 +70,7 @@ class Divided:
     state: State
     tally: Tally
     codes: Int
-    windows: Windows
+    windows: TimeWindows
     #: number of the stretch, and how long the next one is
     stretch: int
     length: float
@@ -84,7 +84,7 @@ class Divided:
     open: tuple[float, ...] = ()
 
     @classmethod
-    def start(cls, plan: Plan, replica: int) -> Divided:
+    def start(cls, plan: Plan, replica: int) -> SubvolumeReplica:
         """Draw the initial population, not yet in sub-volumes."""
         whole = Group.start(replace(plan, subvolumes=1, replicas=1, distribution=False), replica, 1)
         state = empty_state(plan, np.zeros((1, 4), np.uint64))
@@ -135,7 +135,7 @@ class Divided:
 
     @property
     def intact(self) -> bool:
-        """Whether it could go on: not if memory ended while the particles were dealt out."""
+        """Whether it could go on: not if memory ended while the particles were split."""
         return bool(self.parts) or self.done
 
     def release(self) -> None:
@@ -168,10 +168,10 @@ class Divided:
         plan = within(self.plan, times)
         copies = self._copies()
         size = sum(copies * size_of(part.work) for part in self.parts)
-        what = f"the sub-volumes of replica {self.first}, dealt out anew at t = {start:.6g},"
+        what = f"the sub-volumes of replica {self.first}, filled anew at t = {start:.6g},"
         used = max(1, min(self.plan.subvolumes, copies * int(count[PARTICLES]) // LEAST))
         method, rates = plan.method, self.plan.rates
-        learnt = [method.learnt(part.work, part.state) for part in self.parts]
+        carried = [method.carried(part.work, part.state) for part in self.parts]
         window = int(np.searchsorted(self.windows.edges, start, side="right")) - 1
         loop, parameters = self.parts[0].loop, [part.parameters for part in self.parts]
 
@@ -182,18 +182,18 @@ class Divided:
         def fill(k: int) -> Group:
             words = stream(plan.seed, self.first, _PART, self.stretch, k)
             state = empty_state(plan, words[None])
-            work = method.collect(rates, [given[k] for given in piles], state, plan.mass)
+            work = method.collect(rates, [given[k] for given in split_up], state, plan.mass)
             hand_on(self.state, state)
             state.clock[0, (TIME, VOLUME, EXCESS)] = start, clock[VOLUME] / used, clock[EXCESS]
             if used == 1:
                 state.clock[0, EXTINCT] = clock[EXTINCT]
             state.count[0, WINDOW] = window
-            method.use(work, state, learnt)
+            method.carry_over(work, state, carried)
             known = parameters[k] if k < len(parameters) else None
             return Group.of(plan, self.first, state, work, self.windows, loop, known)
 
         with room.needed(size, what):
-            piles = list(pool.map(split, range(len(self.parts))))
+            split_up = list(pool.map(split, range(len(self.parts))))
             self._double(copies)
             self.parts.clear()  # room for what follows
             filled = list(pool.map(fill, range(used)))
@@ -278,8 +278,8 @@ def _first_stretch(plan: Plan, replica: int) -> float:
     return min(plan.remix / each, plan.times[-1])
 
 
-def start(plan: Plan, first: int, count: int) -> Group | Divided:
+def start(plan: Plan, first: int, count: int) -> Group | SubvolumeReplica:
     """Start the replicas from `first` on; those in sub-volumes one by one."""
     if plan.subvolumes > 1:
-        return Divided.start(plan, first)
+        return SubvolumeReplica.start(plan, first)
     return Group.start(plan, first, count)

@@ -24,11 +24,11 @@ from smolux.core.state import (
     WORST_I,
     WORST_J,
 )
-from smolux.processes.base import LoneProcess, PairProcess, text_of
+from smolux.processes.base import PairProcess, UnaryProcess, text_of
 
 from .plan import Plan
 from .replicas import Group
-from .subvolumes import Divided
+from .subvolumes import SubvolumeReplica
 
 Float = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ Float = NDArray[np.float64]
 _RARE, _MANY = 1e-3, 1e5
 
 
-def attempts_of(plan: Plan, groups: Sequence[Group | Divided]) -> Float:
+def attempts_of(plan: Plan, groups: Sequence[Group | SubvolumeReplica]) -> Float:
     """Candidates for each process, of shape (R, P).
 
     Which process an encounter belongs to is decided last: its candidates are shared among the
@@ -44,7 +44,7 @@ def attempts_of(plan: Plan, groups: Sequence[Group | Divided]) -> Float:
     """
     found = np.concatenate([g.state.attempts for g in groups]).astype(float)
     pairs = sum(isinstance(process, PairProcess) for process in plan.model.processes)
-    alone = pairs + sum(isinstance(process, LoneProcess) for process in plan.model.processes)
+    alone = pairs + sum(isinstance(process, UnaryProcess) for process in plan.model.processes)
     if pairs:
         trials = np.concatenate([g.state.count[:, TRIALS] for g in groups])
         events = np.concatenate([g.state.events[:, :pairs] for g in groups]).astype(float)
@@ -89,7 +89,7 @@ class Totals:
     first: float
 
     @classmethod
-    def of(cls, groups: Sequence[Group | Divided], attempts: Float) -> Totals:
+    def of(cls, groups: Sequence[Group | SubvolumeReplica], attempts: Float) -> Totals:
         """Add up groups; the `attempts` are those of `attempts_of`."""
         clock = np.concatenate([g.state.clock for g in groups])
         count = np.concatenate([g.state.count for g in groups])
@@ -147,7 +147,7 @@ class Totals:
                 "what no candidate has met. A kernel written as a formula, or bounds= of "
                 "from_function that hold, have no such error"
             )
-        splits = [isinstance(p, LoneProcess) and p.splits for p in plan.model.processes]
+        splits = [isinstance(p, UnaryProcess) and p.splits for p in plan.model.processes]
         cure = "A formula in i and j has proved bounds; of a function, from_function takes them"
         name = f"fragmentation, for a size above {EXACT},"
         lacking = _lacking(self.missed[BY_SPLITS], int(self.events[splits].sum()))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from .axes import Axis, read_axes
 from .grid import SweepProgress, go_on, sweep
-from .over import Axis, read_axes
 from .points import Folder, Point, Sweep
 
 __all__ = ["Axis", "Folder", "Point", "Sweep", "SweepProgress", "go_on", "read_axes", "sweep"]

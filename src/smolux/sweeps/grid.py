@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import smolux
 from smolux import results
-from smolux.analysis.sweeps import gather
+from smolux.analysis.sweeps import combine_sweep
 from smolux.case import Case
 from smolux.errors import InputError, Interrupted, quiet
 from smolux.runtime.executors import adapted, completed, opened
 from smolux.runtime.progress import Progress
 from smolux.runtime.resources import available_memory
 
-from .over import read_axes
+from .axes import read_axes
 from .points import Folder, Point, Sweep, make_sweep
 
 if TYPE_CHECKING:
@@ -153,7 +153,7 @@ class _Running:
         self.events, self.compile_seconds, self.bounds_seconds = 0, 0.0, 0.0
 
     def finish(self) -> xr.Dataset:
-        """Do what is missing and gather everything."""
+        """Do what is missing and combine everything."""
         missing = [p for p in self.points if not self._is_done(p)]
         try:
             self._tell()
@@ -265,7 +265,7 @@ class _Running:
         if len(self.failures) == len(self.points):
             first = self.points[0]
             raise InputError(f"every point failed; {first.label}: {messages[0]}")
-        ds = gather({axis.key: axis.values for axis in self.plan.axes}, found, messages)
+        ds = combine_sweep({axis.key: axis.values for axis in self.plan.axes}, found, messages)
         return ds.assign_attrs(base_case=self.plan.text, seed=str(self.plan.seed))
 
 

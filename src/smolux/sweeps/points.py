@@ -21,7 +21,7 @@ from smolux.case.write import to_toml, value
 from smolux.errors import InputError
 from smolux.runtime.files import replacing
 
-from .over import Axis
+from .axes import Axis
 
 #: messages that are told of a sweep in which many points are wrong
 _MOST_MESSAGES = 10

@@ -46,8 +46,8 @@ class Weighting:
         raise NotImplementedError
 
     @property
-    def factor(self) -> Callable[..., Any] | None:
-        """``factor(i, j, *parameters)``: the simulated rate over that of the kernel.
+    def rate_ratio(self) -> Callable[..., Any] | None:
+        """``rate_ratio(i, j, *parameters)``: the simulated rate over that of the kernel.
 
         None if there is no shorter form than by the definition.
         """
@@ -55,7 +55,7 @@ class Weighting:
 
     @property
     def parameters(self) -> tuple[Any, ...]:
-        """What `weight` and `factor` take after the sizes."""
+        """What `weight` and `rate_ratio` take after the sizes."""
         return ()
 
     @property
@@ -78,12 +78,12 @@ class Weighting:
         """How many physical particles a simulated particle of each size stands for."""
         return 1.0 / self.weights(sizes)
 
-    def factors(self, i: ArrayLike, j: ArrayLike) -> Float:
+    def rate_ratios(self, i: ArrayLike, j: ArrayLike) -> Float:
         """Return the simulated rate over that of the kernel, on arrays of sizes."""
         i, j = np.broadcast_arrays(np.asarray(i, float), np.asarray(j, float))
         with np.errstate(all="ignore"):
-            if self.factor is not None:
-                return np.asarray(self.factor(i, j, *self.parameters), float)
+            if self.rate_ratio is not None:
+                return np.asarray(self.rate_ratio(i, j, *self.parameters), float)
             one, two = self.weights(i), self.weights(j)
             return np.maximum(np.maximum(one, two), self.weights(i + j)) / (one * two)
 
@@ -96,14 +96,14 @@ class Weighting:
 
         def rate(i: Any, j: Any) -> Float:
             with np.errstate(all="ignore"):
-                return np.asarray(kernel(i, j) * self.factors(i, j))
+                return np.asarray(kernel(i, j) * self.rate_ratios(i, j))
 
         return rate
 
     def bounds(self, kernel: Kernel) -> Callable[..., tuple[Float, Float]]:
         """Return the bounds of the simulated rate, see `smolux.kernels.base.Kernel.bounds`.
 
-        Those of kernel and factor over small boxes, multiplied: over a large one both need not be
+        Those of kernel and ratio over small boxes, multiplied: over a large one both need not be
         attained for the same pair.
         """
 

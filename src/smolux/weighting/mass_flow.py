@@ -18,7 +18,7 @@ def _weight(size: Any) -> Any:
     return size
 
 
-def _factor(i: Any, j: Any) -> Any:
+def _ratio(i: Any, j: Any) -> Any:
     return (i + j) / (i * j)
 
 
@@ -45,9 +45,9 @@ class MassFlow(Weighting):
         return _weight
 
     @property
-    def factor(self) -> Callable[..., Any]:
-        """See `Weighting.factor`."""
-        return _factor
+    def rate_ratio(self) -> Callable[..., Any]:
+        """See `Weighting.rate_ratio`."""
+        return _ratio
 
     def interval(self, i: Interval, j: Interval) -> Interval:
         """See `Weighting.interval`."""

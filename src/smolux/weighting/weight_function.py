@@ -28,7 +28,7 @@ def power(size: Any, q: Any) -> Any:
     return np.sqrt(size) if q == 0.5 else size**q
 
 
-def power_factor(i: Any, j: Any, q: Any) -> Any:
+def power_ratio(i: Any, j: Any, q: Any) -> Any:
     """Return the largest of ``(i + j)**q``, ``i**q`` and ``j**q`` over ``(i j)**q``."""
     if q < 0.0:
         return np.maximum(i, j) ** (-q)
@@ -44,7 +44,7 @@ def larger(x: Any, y: Any) -> Interval:
 
 
 def power_interval(i: Interval, j: Interval, q: float) -> Interval:
-    """Bounds of `power_factor` over intervals: it is monotonic in each size."""
+    """Bounds of `power_ratio` over intervals: it is monotonic in each size."""
     if q < 0.0:
         return larger(i, j) ** (-q)
     return (1.0 / i + 1.0 / j) ** q
@@ -103,9 +103,9 @@ class WeightFunction(Weighting):
         return self._law.rate if self.exponent is None else power
 
     @property
-    def factor(self) -> Callable[..., Any] | None:
-        """See `Weighting.factor`."""
-        return None if self.exponent is None else power_factor
+    def rate_ratio(self) -> Callable[..., Any] | None:
+        """See `Weighting.rate_ratio`."""
+        return None if self.exponent is None else power_ratio
 
     @property
     def parameters(self) -> tuple[Any, ...]:
@@ -145,9 +145,9 @@ class WeightFunction(Weighting):
 
 
 def power_majorant(majorant: Majorant | None, q: float) -> Majorant | None:
-    """Multiply a majorant by one of `power_factor`; None is left as it is.
+    """Multiply a majorant by one of `power_ratio`; None is left as it is.
 
-    With ``x = i**-q`` and ``y = j**-q`` the factor lies between ``x + y`` and ``2**(q - 1)`` times
+    With ``x = i**-q`` and ``y = j**-q`` the ratio lies between ``x + y`` and ``2**(q - 1)`` times
     that, for a negative power between half of it and ``x + y``.
     """
     if majorant is None:

@@ -17,7 +17,6 @@ from smolux.core.state import (
     FIRST,
     FLOOR,
     LARGEST,
-    LONE_BITS,
     MAJORANT,
     MONOMERS,
     PARTICLES,
@@ -26,6 +25,7 @@ from smolux.core.state import (
     SMALLEST,
     STORED,
     TRIALS,
+    UNARY_BITS,
     VALUE,
     VOLUME,
 )
@@ -67,7 +67,7 @@ def _pick(s, w, r, c):
     if c == 1:
         return rng.below(s.rng, s.count[MONOMERS]), np.int64(1)
     # all others are held together
-    largest = largest_rate(s, r, np.int64(2), slot_of(s.count[LARGEST], LONE_BITS))
+    largest = largest_rate(s, r, np.int64(2), slot_of(s.count[LARGEST], UNARY_BITS))
     while True:
         k = rng.below(s.rng, s.count[STORED])
         size = np.int64(w.sizes[k])

@@ -9,7 +9,7 @@ import numpy as np
 
 from smolux.core import rng
 from smolux.core.slots import slot_top
-from smolux.core.state import LARGEST, LONE_BITS, SINCE, STORED
+from smolux.core.state import LARGEST, SINCE, STORED, UNARY_BITS
 from smolux.jit.compile import cold_piece, piece
 
 
@@ -68,7 +68,7 @@ def size_at(s, w, slot):
 @piece
 def pick(s, w, r, c):
     """Slot and size of a particle, see `smolux.core.loop.Pieces`."""
-    low, high = slot_top(c - 1, LONE_BITS) + 1, slot_top(c, LONE_BITS)
+    low, high = slot_top(c - 1, UNARY_BITS) + 1, slot_top(c, UNARY_BITS)
     left, buckets = rng.below(s.rng, s.held[c]), w.table.shape[1]
     for slot in range(low - 1, min(high, buckets)):
         if left < w.number[slot]:

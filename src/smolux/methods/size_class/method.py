@@ -15,7 +15,7 @@ from smolux.errors import InputError
 from smolux.methods.base import Int, Method, Rates, Words, enlarged, size_of, spread
 
 from . import pieces
-from .split import Pile, collect, split
+from .split import Part, collect, split
 from .state import AHEAD, BITS, CHUNK, FREE, META, NEXT, SINGLE, SPAN, STALE, WIDEST, Work
 
 #: octaves of sizes by which arrays and bounds are extended
@@ -153,38 +153,38 @@ class SizeClass(Method):
         lists = [_members(work, replica, g) for g in range(single, len(number)) if number[g]]
         return number[:single], np.concatenate([*lists, np.zeros(0, np.int64)])
 
-    def split(self, work: Work, state: State, parts: int, copies: int, words: Words) -> list[Pile]:
+    def split(self, work: Work, state: State, number: int, copies: int, words: Words) -> list[Part]:
         """See `Method.split`."""
-        return split(work, parts, copies, words)
+        return split(work, number, copies, words)
 
-    def collect(self, rates: Rates, piles: list[Pile], state: State, mass: int) -> Work:
-        """See `Method.collect`; classes are as in the stores from which the piles come."""
-        number = np.zeros(max(len(pile.number) for pile in piles), np.int64)
-        for pile in piles:
-            number[: len(pile.number)] += pile.number
-        total, bits = int(number.sum()), piles[0].bits
-        wide = max(pile.widest for pile in piles) > _NARROW
+    def collect(self, rates: Rates, parts: list[Part], state: State, mass: int) -> Work:
+        """See `Method.collect`; classes are as in the stores from which the parts come."""
+        number = np.zeros(max(len(part.number) for part in parts), np.int64)
+        for part in parts:
+            number[: len(part.number)] += part.number
+        total, bits = int(number.sum()), parts[0].bits
+        wide = max(part.widest for part in parts) > _NARROW
         work = _empty(1, len(number), bits, _chunk(total), total, wide, rates)
         state.count[0, PARTICLES] = total
-        collect(work, piles)
+        collect(work, parts)
         work.before[:] = work.number
         return work
 
-    def learnt(self, work: Work, state: State) -> Any:
-        """See `Method.learnt`: bounds of pairs of classes, and how often a particle comes in."""
+    def carried(self, work: Work, state: State) -> Any:
+        """See `Method.carried`: bounds of pairs of classes, and how often a particle comes in."""
         bits, span = (int(work.meta[0, k]) for k in (BITS, SPAN))
         return bits, span, int(state.count[0, SINCE]), work.flow[0], work.high, work.low
 
-    def use(self, work: Work, state: State, learnt: list[Any]) -> None:
-        """See `Method.use`."""
-        learnt = [found for found in learnt if found[0] == work.meta[0, BITS]]
-        for _, _, _, _, high, low in learnt:
+    def carry_over(self, work: Work, state: State, carried: list[Any]) -> None:
+        """See `Method.carry_over`."""
+        carried = [found for found in carried if found[0] == work.meta[0, BITS]]
+        for _, _, _, _, high, low in carried:
             n = min(high.shape[1], work.high.shape[1])
             own = work.high[:, :n, :n], work.low[:, :n, :n]
             new = ~(own[0] >= high[:, :n, :n])  # unknown so far, or raised by another
             own[0][new], own[1][new] = high[:, :n, :n][new], low[:, :n, :n][new]
-        if learnt:
-            _, span, since, flow, _, _ = learnt[0]
+        if carried:
+            _, span, since, flow, _, _ = carried[0]
             n = min(len(flow), work.flow.shape[1])
             work.meta[0, SPAN], state.count[0, SINCE] = span, since
             work.flow[0, :n] = flow[:n]

@@ -1,4 +1,4 @@
-"""Dealing the particles of one size-class store out to several, at random, in compiled code."""
+"""Splitting the particles of one size-class store among several, at random, in compiled code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .lists import append, is_list, place_of, size_at
 from .state import BITS, SINGLE, WIDEST, view
 
 
-class Pile(NamedTuple):
+class Part(NamedTuple):
     """What one store gives to another.
 
     Attributes
@@ -75,8 +75,8 @@ def _compiled() -> tuple[Any, Any]:
     return entry(split), entry(collect)
 
 
-def split(work: Any, parts: int, copies: int, words: NDArray[np.uint64]) -> list[Pile]:
-    """Put every particle `copies` times into one of several piles, each as likely as the other."""
+def split(work: Any, parts: int, copies: int, words: NDArray[np.uint64]) -> list[Part]:
+    """Put every particle `copies` times into one of several parts, each as likely as the other."""
     bits = int(work.meta[0, BITS])
     listed = np.arange(work.number.shape[1]) >= work.meta[0, SINGLE]
     number = np.zeros((parts, len(listed)), np.int64)
@@ -87,12 +87,12 @@ def split(work: Any, parts: int, copies: int, words: NDArray[np.uint64]) -> list
     _compiled()[0](work, words, words.copy(), copies, number, np.zeros_like(number), sizes)
     ends = np.cumsum(number[:, listed].sum(axis=1))[:-1]
     return [
-        Pile(mine, part, bits, int(work.meta[0, WIDEST]))
+        Part(mine, part, bits, int(work.meta[0, WIDEST]))
         for mine, part in zip(number, np.split(sizes, ends), strict=True)
     ]
 
 
-def collect(work: Any, piles: list[Pile]) -> None:
-    """Put piles into an empty store with room for them."""
-    for pile in piles:
-        _compiled()[1](work, pile.number, pile.sizes)
+def collect(work: Any, parts: list[Part]) -> None:
+    """Put parts into an empty store with room for them."""
+    for part in parts:
+        _compiled()[1](work, part.number, part.sizes)

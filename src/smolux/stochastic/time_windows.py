@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from smolux.core.state import LIMIT, Windows
+from smolux.core.state import LIMIT, TimeWindows
 from smolux.errors import InputError
 from smolux.functions.time import TimeFunction
 from smolux.functions.user_function import golden
@@ -64,12 +64,12 @@ def _glimpse(factor: TimeFunction, start: float, end: float) -> float:
 
 
 @timed
-def windows_for(
+def time_windows_for(
     processes: Sequence[Process],
     end: float,
     weighting: Weighting | None = None,
     kernel: Kernel | None = None,
-) -> Windows:
+) -> TimeWindows:
     """Bound the rate factors over windows of time that depend on the factors alone.
 
     Terms of the kernel may have factors of their own, see `Kernel.in_time`. Pairs are drawn by
@@ -98,7 +98,7 @@ def windows_for(
     array = np.array(bounds, float)
     pairs = sum(isinstance(process, PairProcess) for process in processes)
     total = array[:, :pairs].sum(axis=1)
-    return Windows(np.array(edges), array, total, *_beside(processes, weighting or Number()))
+    return TimeWindows(np.array(edges), array, total, *_beside(processes, weighting or Number()))
 
 
 #: times at which the inflow is looked at for its mean
@@ -132,7 +132,7 @@ def inflow(processes: Sequence[Process], weighting: Weighting, end: float) -> fl
 
 
 def _beside(processes: Sequence[Process], weighting: Weighting) -> tuple[Any, ...]:
-    """Tables of sources, and what is cut off, see `smolux.core.state.Windows`."""
+    """Tables of sources, and what is cut off, see `smolux.core.state.TimeWindows`."""
     tables = [p.table for p in processes if isinstance(p, Source)]
     most = max((len(sizes) for sizes, _ in tables), default=0)
     size, share = np.ones((len(tables), most), np.int64), np.ones((len(tables), most))

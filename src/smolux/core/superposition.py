@@ -4,7 +4,7 @@ Three streams superpose, and the earliest event is the next one; after it all ar
 which changes nothing, as waiting times have no memory.
 
 - Encounters, drawn by the method.
-- Single particles, see `smolux.core.lone`.
+- Single particles, see `smolux.core.unary`.
 - Sources, each at a constant rate for a unit of volume.
 
 The encounter is drawn first: it is the most frequent event. Where many candidates for it have been
@@ -36,10 +36,6 @@ from .state import (
     IN_DOUBT,
     KIND,
     LATE,
-    LONE,
-    LONE_PART,
-    LONE_PROCESS,
-    LONE_SIZE,
     MASS_OUT,
     ONE,
     OTHER,
@@ -47,6 +43,10 @@ from .state import (
     SPLIT_IN_DOUBT,
     TIME,
     TRIALS,
+    UNARY,
+    UNARY_PART,
+    UNARY_PROCESS,
+    UNARY_SIZE,
     VOLUME,
     WANTED,
     WINDOW,
@@ -57,19 +57,19 @@ PAIR, ALONE, SOURCE = 0, 1, 2
 _MANY = 256
 
 
-def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lones: int,
+def make_next_event(draw: Any, ready: Any, unary: Any, select: Any, pairs: int, unaries: int,
                     sources: int) -> Any:  # fmt: skip
     """Bind the drawing of the next event, of whatever kind; see `smolux.core.loop`.
 
-    `ready` and `lone` are those of `smolux.core.lone`, and not called if nothing happens to single
-    particles.
+    `ready` and `unary` are those of `smolux.core.unary`, and not called if nothing happens to
+    single particles.
     """
 
     @cold_piece
     def source_rate(s, windows):
         total = 0.0
         for r in range(sources):
-            k = pairs + lones + r
+            k = pairs + unaries + r
             bound = windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
             total += bound * windows.inflow[r]
         return total * s.clock[VOLUME]
@@ -93,8 +93,8 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
                 if come < wait:
                     wait = come
                     s.count[KIND] = SOURCE
-        if lones > 0:
-            alone = lone(s, w, windows, q.lone, wait)
+        if unaries > 0:
+            alone = unary(s, w, windows, q.unary, wait)
             if math.isnan(alone):
                 return math.nan
             if alone < wait:
@@ -106,8 +106,8 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
     def next_event(s, w, windows, p, q, until, stop):
         s.count[KIND] = PAIR
         s.count[FIRST] = -1
-        if lones > 0:
-            reason = ready(s, w, p, q.lone)
+        if unaries > 0:
+            reason = ready(s, w, p, q.unary)
             if reason != 0:
                 return reason
         s.missed[IN_DOUBT] = s.missed[SPLIT_IN_DOUBT] = 0.0
@@ -129,15 +129,17 @@ def make_next_event(draw: Any, ready: Any, lone: Any, seize: Any, pairs: int, lo
             s.count[LATE] = 0
         elif looked > _MANY:
             s.count[LATE] = 1
-        if lones > 0 and s.count[KIND] == ALONE:
-            seize(s, w, s.count[LONE])
+        if unaries > 0 and s.count[KIND] == ALONE:
+            select(s, w, s.count[UNARY])
         schedule(s, windows, min(wait, first))
         return 0
 
     return next_event
 
 
-def make_choice(lone_factor: Any, source_factor: Any, pairs: int, lones: int, sources: int) -> Any:
+def make_choice(
+    unary_factor: Any, source_factor: Any, pairs: int, unaries: int, sources: int
+) -> Any:
     """Bind the choice of the process of an event that is no encounter, or none (-1)."""
 
     @cold_piece
@@ -148,16 +150,16 @@ def make_choice(lone_factor: Any, source_factor: Any, pairs: int, lones: int, so
 
     @cold_piece
     def choose_alone(s, windows, q):
-        r = s.count[LONE_PROCESS]
+        r = s.count[UNARY_PROCESS]
         k = pairs + r
         bound = windows.bounds[s.count[WINDOW], k] + s.clock[CLOCKS + k]
-        value = lone_factor(r, s.clock[PENDING], q.lone_factors)
+        value = unary_factor(r, s.clock[PENDING], q.unary_factors)
         return kept(s, windows, k, value, rng.uniform(s.rng) * bound)
 
     @cold_piece
     def choose_source(s, windows, q):
         total = 0.0
-        first = pairs + lones
+        first = pairs + unaries
         for r in range(sources):
             bound = windows.bounds[s.count[WINDOW], first + r] + s.clock[CLOCKS + first + r]
             total += bound * windows.inflow[r]
@@ -176,15 +178,15 @@ def make_choice(lone_factor: Any, source_factor: Any, pairs: int, lones: int, so
     @piece
     def choose(s, windows, q):
         if s.count[KIND] == ALONE:
-            return choose_alone(s, windows, q) if lones > 0 else -1
+            return choose_alone(s, windows, q) if unaries > 0 else -1
         return choose_source(s, windows, q) if sources > 0 else -1
 
     return choose
 
 
 def make_kinds(
-    encounters: Kinds, lone_outcome: Any, choose_other: Any, stands: Any, rounded: Any, pairs: int,
-    lones: int,
+    encounters: Kinds, unary_outcome: Any, choose_other: Any, stands: Any, rounded: Any, pairs: int,
+    unaries: int,
 ) -> Kinds:  # fmt: skip
     """Bind the events beside encounters to these, see `smolux.core.fire.Kinds`.
 
@@ -196,7 +198,7 @@ def make_kinds(
     @cold_piece
     def pick(s, windows, r):
         """Size of a particle that comes in."""
-        k = r - pairs - lones
+        k = r - pairs - unaries
         x = rng.uniform(s.rng)
         m = 0
         while m < windows.share.shape[1] - 1 and x >= windows.share[k, m]:
@@ -207,7 +209,7 @@ def make_kinds(
     def alive(s):
         if s.count[KIND] == PAIR:
             return encounters.alive(s)
-        return s.count[LONE] >= 0 or s.count[KIND] == SOURCE
+        return s.count[UNARY] >= 0 or s.count[KIND] == SOURCE
 
     @piece
     def choose(s, w, windows, q):
@@ -220,8 +222,8 @@ def make_kinds(
         if s.count[KIND] == PAIR:
             return encounters.result(s, w, windows, r, p, q)
         if s.count[KIND] == ALONE:
-            size = s.count[LONE_SIZE]
-            entries, removes = lone_outcome(r - pairs, size, s.count[LONE_PART], s)
+            size = s.count[UNARY_SIZE]
+            entries, removes = unary_outcome(r - pairs, size, s.count[UNARY_PART], s)
             entries = rounded(s, entries, size, p)
             left = float(size) * stands(size, p) if removes else 0.0
             return entries, size, np.int64(0), ONE, 0.0, left
@@ -239,10 +241,10 @@ def make_kinds(
     return Kinds(alive, choose, result, note)
 
 
-def make_books(stands: Any, ledger: Any, known: Any, lones: int) -> Books:
+def make_books(stands: Any, ledger: Any, known: Any, unaries: int) -> Books:
     """Bind what is kept beside, see `smolux.core.fire.Books`.
 
-    The `ledger` and `known` are those of `smolux.core.lone`, and not called if nothing happens to
+    The `ledger` and `known` are those of `smolux.core.unary`, and not called if nothing happens to
     single particles.
     """
     enter, leave = ledger.enter, ledger.leave
@@ -276,4 +278,4 @@ def make_books(stands: Any, ledger: Any, known: Any, lones: int) -> Books:
         for e in range(entries):
             enter(s, s.sizes[e], s.counts[e], q)
 
-    return Books(cut_off, wanting, book, lones)
+    return Books(cut_off, wanting, book, unaries)

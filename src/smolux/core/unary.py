@@ -28,14 +28,14 @@ from .state import (
     COUNTED,
     CULPRIT,
     LARGEST,
-    LONE,
-    LONE_BITS,
-    LONE_PART,
-    LONE_PROCESS,
-    LONE_SIZE,
     PARTICLES,
     SPLITS,
     TRIALS,
+    UNARY,
+    UNARY_BITS,
+    UNARY_PART,
+    UNARY_PROCESS,
+    UNARY_SIZE,
     VAIN,
     VALUE,
     WANTED,
@@ -48,8 +48,8 @@ from .state import (
 _ENOUGH = 4
 
 
-class Lone(NamedTuple):
-    """A process of single particles, plain; see `smolux.processes.base.LoneProcess`."""
+class Unary(NamedTuple):
+    """A process of single particles, plain; see `smolux.processes.base.UnaryProcess`."""
 
     law: Callable[..., Any]
     outcome: Callable[..., Any]
@@ -59,7 +59,7 @@ class Lone(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Rates of all processes of single particles, bound; `q` is ``Parameters.lone``.
+    """Rates of all processes of single particles, bound; `q` is ``Parameters.unary``.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Rates(NamedTuple):
     part: Any
 
 
-def _bind_one(process: Lone) -> Rates:
+def _bind_one(process: Unary) -> Rates:
     if process.splits:
         total, known, part = bind_splits(process.law)
         return Rates(total, known, part)
@@ -98,7 +98,7 @@ def _bind_one(process: Lone) -> Rates:
     return Rates(rate, always, whole)
 
 
-def bind_rates(processes: Sequence[Lone]) -> Rates:
+def bind_rates(processes: Sequence[Unary]) -> Rates:
     """Bind the rates of all processes; without any, what is never called."""
     if not processes:
         return Rates(None, None, None)
@@ -139,7 +139,7 @@ def bind_rates(processes: Sequence[Lone]) -> Rates:
     return Rates(total, known, part)
 
 
-def bind_outcomes(processes: Sequence[Lone]) -> Any:
+def bind_outcomes(processes: Sequence[Unary]) -> Any:
     """Bind ``outcome(r, size, part, s)``, and whether mass leaves by it."""
     if not processes:
 
@@ -200,16 +200,16 @@ def make_ledger(rates: Rates, visit: Callable[[Any], Any], count: int) -> Ledger
     @piece
     def add_up(s, c):
         """Sum afresh what changed: nothing drifts."""
-        o = c >> LONE_BITS
+        o = c >> UNARY_BITS
         for r in range(count):
             own = 0.0
-            for k in range(o << LONE_BITS, (o + 1) << LONE_BITS):
+            for k in range(o << UNARY_BITS, (o + 1) << UNARY_BITS):
                 own += s.held[k] * s.most[r, k] if k != COUNTED else 0.0
             s.sums[r, o] = own
 
     @cold_piece
     def enter(s, size, number, q):
-        c = slot_of(size, np.int64(LONE_BITS))
+        c = slot_of(size, np.int64(UNARY_BITS))
         for r in range(count):
             value = total(r, size, s, q)
             if 0.0 <= value < math.inf:
@@ -223,7 +223,7 @@ def make_ledger(rates: Rates, visit: Callable[[Any], Any], count: int) -> Ledger
 
     @cold_piece
     def leave(s, size):
-        c = slot_of(size, np.int64(LONE_BITS))
+        c = slot_of(size, np.int64(UNARY_BITS))
         s.held[c] -= 1
         if s.held[c] == 0:
             for r in range(count):
@@ -257,7 +257,7 @@ def make_ledger(rates: Rates, visit: Callable[[Any], Any], count: int) -> Ledger
     return Ledger(enter, leave, ready)
 
 
-def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) -> Any:
+def make_unary(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) -> Any:
     """Bind the drawing of the next event of a single particle.
 
     ``draw(s, w, windows, q, limit)`` returns the waiting time; infinite if it would not be below
@@ -288,7 +288,7 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
             if inside:
                 break
         factor, slot = factor_bound(s, windows, process), np.int64(0)
-        for c in range(octave << LONE_BITS, (octave + 1) << LONE_BITS):
+        for c in range(octave << UNARY_BITS, (octave + 1) << UNARY_BITS):
             value = factor * s.held[c] * s.most[process, c]
             if c > 0 and value > 0.0:
                 slot = np.int64(c)
@@ -307,18 +307,18 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
         before = s.count[TRIALS]
         s.count[TRIALS] += 1
         one, size = pick(s, w, r, c)
-        s.count[LONE], s.count[LONE_SIZE], s.count[LONE_PROCESS] = one, size, r
-        s.count[LONE_PART] = 0
-        if accepted(s, total(r, size, s, q), s.most[r, slot_of(size, np.int64(LONE_BITS))]):
-            s.count[LONE_PART] = part(r, size, s, q)
+        s.count[UNARY], s.count[UNARY_SIZE], s.count[UNARY_PROCESS] = one, size, r
+        s.count[UNARY_PART] = 0
+        if accepted(s, total(r, size, s, q), s.most[r, slot_of(size, np.int64(UNARY_BITS))]):
+            s.count[UNARY_PART] = part(r, size, s, q)
         s.attempts[pairs + r] += s.count[TRIALS] - before
-        return min(s.count[LONE_PART], np.int64(1))
+        return min(s.count[UNARY_PART], np.int64(1))
 
     @piece
-    def draw_lone(s, w, windows, q, limit):
+    def draw_unary(s, w, windows, q, limit):
         if s.count[PARTICLES] == 0:
             return math.inf
-        octaves = (slot_of(s.count[LARGEST], np.int64(LONE_BITS)) >> LONE_BITS) + 1
+        octaves = (slot_of(s.count[LARGEST], np.int64(UNARY_BITS)) >> UNARY_BITS) + 1
         rate = 0.0
         for r in range(count):
             own = 0.0
@@ -345,7 +345,7 @@ def make_lone(pick: Callable[..., Any], rates: Rates, pairs: int, count: int) ->
             if s.count[VAIN] > _ENOUGH * s.count[PARTICLES] + PATIENCE:
                 s.held[COUNTED] = 0  # what had the largest rates may be gone
                 break
-        s.count[LONE] = -1
+        s.count[UNARY] = -1
         return wait
 
-    return draw_lone
+    return draw_unary
