@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import smolux as sx
 from smolux import initial, kernels, processes
 from smolux.case import Case, Output, Run, Solve, load, parse
-from smolux.case.spatial import Flight
+from smolux.case.spatial import SpatialRun
 from smolux.errors import InputError
 from smolux.model import Model
 
@@ -170,7 +170,7 @@ def defaults(call):
     [
         (Run, [sx.simulate]),
         (Solve, [sx.solve]),
-        (Flight, [sx.spatial.lattice, sx.spatial.random, sx.spatial.simulate]),
+        (SpatialRun, [sx.spatial.lattice, sx.spatial.random, sx.spatial.simulate]),
     ],
 )
 def test_a_case_file_has_the_defaults_of_a_call(table, calls):

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import functools
+import importlib
 import importlib.metadata
 import importlib.resources
+import inspect
+import pkgutil
 import re
 import subprocess
 import sys
+import types
 from pathlib import Path
 
 import pytest
@@ -99,6 +104,31 @@ def test_every_name_of_the_reference_is_reached_from_the_package_alone():
         [sys.executable, "-c", "import smolux\n" + "\n".join(f"smolux.{n}" for n in names)],
         check=True,
     )
+
+
+METHODS = (
+    types.FunctionType, property, functools.cached_property, classmethod, staticmethod,
+)  # fmt: skip
+
+
+def public_methods():
+    """Name and value of all that is defined in public classes as a method or property."""
+    for module in pkgutil.walk_packages(smolux.__path__, "smolux."):
+        if module.name.endswith("__main__"):
+            continue
+        for name, of in vars(importlib.import_module(module.name)).items():
+            if not inspect.isclass(of) or of.__module__ != module.name or name.startswith("_"):
+                continue
+            for key, value in vars(of).items():
+                here = getattr(value, "__qualname__", of.__qualname__).startswith(of.__qualname__)
+                if isinstance(value, METHODS) and here and not key.startswith("_"):
+                    yield f"{module.name}.{name}.{key}", getattr(of, key, value)
+
+
+def test_every_public_method_is_described_where_it_is_or_by_what_it_overrides():
+    methods = dict(public_methods())
+    assert len(methods) > 600
+    assert [name for name, method in methods.items() if not inspect.getdoc(method)] == []
 
 
 def test_unknown_name():

@@ -33,7 +33,7 @@ _RUN = {name: kind for name, kind in kinds(SpatialSettings).items() if name != "
 
 
 @dataclass(frozen=True)
-class Flight:
+class SpatialRun:
     """How discs are placed and moved: the table ``[spatial]``."""
 
     discs: int
@@ -92,7 +92,7 @@ class Flight:
 
 
 @dataclass(frozen=True)
-class FlightOutput:
+class SpatialOutput:
     """What is written beside the results."""
 
     figures: tuple[str, ...] = ("discs", "coarsening")
@@ -105,8 +105,8 @@ class FlightOutput:
 class SpatialCase:
     """What a case file of discs in a box says."""
 
-    run: Flight
-    output: FlightOutput = field(default_factory=FlightOutput)
+    run: SpatialRun
+    output: SpatialOutput = field(default_factory=SpatialOutput)
     title: str = ""
 
     def with_seed(self) -> SpatialCase:
@@ -152,14 +152,14 @@ def load(path: str | os.PathLike[str], sets: Sequence[str] = ()) -> SpatialCase 
     title = top.text("title", "")
     top.known += ["spatial", "output"]
     top.finish()
-    run = _read_flight(content["spatial"], problems)
+    run = _read_run(content["spatial"], problems)
     output = _read_output(content.get("output", {}), problems)
     problems.raise_if_any()
     assert run is not None
     return SpatialCase(run, output, title)
 
 
-def _read_flight(content: Any, problems: Problems) -> Flight | None:
+def _read_run(content: Any, problems: Problems) -> SpatialRun | None:
     from smolux.spatial.methods import NAMES
 
     table = Table(content, ("spatial",), problems)
@@ -167,15 +167,15 @@ def _read_flight(content: Any, problems: Problems) -> Flight | None:
         table.require("discs", "how many discs there are, such as 2500")
     settings: dict[str, Any] = {
         "discs": table.integer("discs", 1, 1),
-        "initial": table.choice("initial", Flight.initial, ("lattice", "random")),
-        "volume_fraction": table.number("volume_fraction", Flight.volume_fraction, above=0.0),
-        "dimension": table.integer("dimension", Flight.dimension, 2, 3),
+        "initial": table.choice("initial", SpatialRun.initial, ("lattice", "random")),
+        "volume_fraction": table.number("volume_fraction", SpatialRun.volume_fraction, above=0.0),
+        "dimension": table.integer("dimension", SpatialRun.dimension, 2, 3),
         "walls": _read_walls(table),
-        "velocities": table.choice("velocities", Flight.velocities, ("unit", "maxwellian")),
-        "temperature": table.number("temperature", Flight.temperature, above=0.0),
-        "radius_sigma": table.number("radius_sigma", Flight.radius_sigma, 1.0),
+        "velocities": table.choice("velocities", SpatialRun.velocities, ("unit", "maxwellian")),
+        "temperature": table.number("temperature", SpatialRun.temperature, above=0.0),
+        "radius_sigma": table.number("radius_sigma", SpatialRun.radius_sigma, 1.0),
         "seed": table.integer("seed", None, 0),
-        "method": table.choice("method", Flight.method, list(NAMES)),
+        "method": table.choice("method", SpatialRun.method, list(NAMES)),
         "step": table.number("step", None, above=0.0),
         "rigid": table.flag("rigid", False) if "rigid" in table else None,
     }
@@ -183,26 +183,26 @@ def _read_flight(content: Any, problems: Problems) -> Flight | None:
         if name == "times":
             settings[name] = read_times(table, kind) if name in table else None
         else:
-            settings[name] = read_key(table, name, kind, getattr(Flight, name))
+            settings[name] = read_key(table, name, kind, getattr(SpatialRun, name))
     if settings["initial"] == "lattice" and settings["radius_sigma"] > 1:
         table.bad("radius_sigma", 'on a lattice all discs are equal; use initial = "random"')
     if len(settings["walls"]) not in (1, settings["dimension"]):
         table.bad("walls", f"one word, or one for each of {settings['dimension']} axes")
     table.finish()
-    flight = Flight(**settings)
-    _check_method(flight, table)
-    return flight
+    run = SpatialRun(**settings)
+    _check_method(run, table)
+    return run
 
 
-def _check_method(flight: Flight, table: Table) -> None:
+def _check_method(run: SpatialRun, table: Table) -> None:
     """Note settings that the method does not have, does not take, or lacks."""
     if table.problems.check_units():
         table.bad("times", "a box has no units: give numbers")
-    if flight.method == "time-stepping":
+    if run.method == "time-stepping":
         if "times" not in table:
             table.require("times", "a run by time steps is observed on its way; give a list")
         try:
-            flight.arguments()
+            run.arguments()
         except InputError as error:
             table.problems.add_error(table.path, error)
         return
@@ -214,25 +214,25 @@ def _check_method(flight: Flight, table: Table) -> None:
 def _read_walls(table: Table) -> tuple[str, ...]:
     from smolux.spatial.box import WALLS
 
-    value = table.take("walls", list(Flight.walls))
+    value = table.take("walls", list(SpatialRun.walls))
     words = [value] if isinstance(value, str) else value
     if not (isinstance(words, list) and words and all(w in WALLS for w in words)):
         table.bad("walls", 'must be "reflecting" or "periodic", or a list with one for each axis')
-        return Flight.walls
+        return SpatialRun.walls
     return tuple(words)
 
 
-def _read_output(content: Any, problems: Problems) -> FlightOutput:
+def _read_output(content: Any, problems: Problems) -> SpatialOutput:
     table = Table(content, ("output",), problems)
-    figures = table.take("figures", list(FlightOutput.figures))
+    figures = table.take("figures", list(SpatialOutput.figures))
     if not (isinstance(figures, list) and all(f in FIGURES for f in figures)):
         table.bad("figures", f"must be a list of some of {show(list(FIGURES))}")
         figures = []
-    output = FlightOutput(
+    output = SpatialOutput(
         tuple(dict.fromkeys(figures)),
-        table.choice("trajectory", FlightOutput.trajectory, _TRAJECTORIES),
-        table.flag("movie", FlightOutput.movie),
-        table.integer("frames", FlightOutput.frames, 1, 10_000),
+        table.choice("trajectory", SpatialOutput.trajectory, _TRAJECTORIES),
+        table.flag("movie", SpatialOutput.movie),
+        table.integer("frames", SpatialOutput.frames, 1, 10_000),
     )
     table.finish()
     return output

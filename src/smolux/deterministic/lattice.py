@@ -27,7 +27,6 @@ class _OnMultiples(Kernel):
 
     @property
     def label(self) -> str:
-        """See `Kernel.label`."""
         return self.kernel.label
 
     def __call__(self, i: ArrayLike, j: ArrayLike) -> Float:
@@ -35,14 +34,11 @@ class _OnMultiples(Kernel):
         return self.kernel(self.unit * np.asarray(i, float), self.unit * np.asarray(j, float))
 
     def bounds(self, *box: ArrayLike) -> tuple[Float, Float]:
-        """See `Kernel.bounds`."""
         return self.kernel.bounds(*(self.unit * np.asarray(side, float) for side in box))
 
     def low_rank_factors(self, sizes: Float) -> Any:
-        """See `Kernel.low_rank_factors`."""
         return self.kernel.low_rank_factors(self.unit * sizes)
 
     @property
     def singled_out(self) -> Float:
-        """See `Kernel.singled_out`."""
         return self.kernel.singled_out / self.unit

@@ -123,27 +123,22 @@ class Tabulated(Initial):
 
     @property
     def total(self) -> float:
-        """See `Initial.total`."""
         return float(self._densities.sum())
 
     @property
     def largest(self) -> int:
-        """See `Initial.largest`."""
         return len(self._densities)
 
     def cumulative(self, sizes: Float) -> Float:
-        """See `Initial.cumulative`."""
         shares = np.concatenate(([0.0], np.cumsum(self._densities)))
         return (shares / shares[-1])[np.clip(sizes, 0, self.largest).astype(np.int64)]
 
     def quantile(self, share: Float) -> Int:
-        """See `Initial.quantile`."""
         shares = np.cumsum(self._densities)
         place = np.searchsorted(shares / shares[-1], share, side="right")
         return np.asarray(np.minimum(place, self.largest - 1) + 1, np.int64)
 
     def densities(self, largest: int) -> Float:
-        """See `Initial.densities`."""
         found = np.zeros(largest)
         found[: min(largest, self.largest)] = self._densities[:largest]
         return found

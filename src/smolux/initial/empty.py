@@ -19,32 +19,25 @@ class Empty(Initial):
 
     @property
     def total(self) -> float:
-        """See `Initial.total`."""
         return 0.0
 
     @property
     def largest(self) -> int:
-        """See `Initial.largest`."""
         return 1
 
     def cumulative(self, sizes: Float) -> Float:
-        """See `Initial.cumulative`."""
         return np.ones(np.shape(sizes))
 
     def quantile(self, share: Float) -> Int:
-        """See `Initial.quantile`."""
         return np.ones(np.shape(share), np.int64)
 
     def weighted(self, weights: Callable[[Float], Float]) -> Initial:
-        """See `Initial.weighted`."""
         return self
 
     def densities(self, largest: int) -> Float:
-        """See `Initial.densities`."""
         return np.zeros(largest)
 
     def sample(self, particles: int, u: float) -> tuple[Int, Int]:
-        """See `Initial.sample`."""
         return np.ones(1, np.int64), np.zeros(1, np.int64)
 
 

@@ -31,7 +31,6 @@ class Exponential(Initial):
 
     @property
     def total(self) -> float:
-        """See `Initial.total`."""
         return self.density
 
     @property
@@ -39,7 +38,6 @@ class Exponential(Initial):
         return float(np.log1p(-1.0 / self.mean)) if self.mean > 1 else -np.inf
 
     def cumulative(self, sizes: Float) -> Float:
-        """See `Initial.cumulative`."""
         sizes = np.floor(np.asarray(sizes, float))
         if self.mean == 1:
             return (sizes >= 1).astype(float)
@@ -52,7 +50,6 @@ class Exponential(Initial):
         return self.density / self.mean * np.exp(np.arange(largest) * self._log_ratio)
 
     def quantile(self, share: Float) -> Int:
-        """See `Initial.quantile`."""
         if self.mean == 1:
             return np.ones(np.shape(share), np.int64)
         return np.floor(np.log1p(-np.asarray(share)) / self._log_ratio).astype(np.int64) + 1

@@ -40,7 +40,6 @@ class Lognormal(Initial):
 
     @property
     def total(self) -> float:
-        """See `Initial.total`."""
         return self.density
 
     def cumulative(self, sizes: Float) -> Float:
@@ -65,7 +64,6 @@ class Lognormal(Initial):
         return self.density * np.concatenate([below[:1], shares])
 
     def quantile(self, share: Float) -> Int:
-        """See `Initial.quantile`."""
         from scipy import special
 
         size = self.median * self.sigma ** special.ndtri(np.asarray(share, float))
@@ -89,7 +87,6 @@ class Lognormal(Initial):
 
     @property
     def remarks(self) -> list[str]:
-        """See `Initial.remarks`."""
         law, found = self.mass
         change = found / law - 1
         if abs(change) <= MASS_CHANGE:

@@ -48,7 +48,6 @@ class Sizes(Initial):
 
     @property
     def total(self) -> float:
-        """See `Initial.total`."""
         return float(sum(self.densities_))
 
     def _shares(self) -> Float:
@@ -57,17 +56,14 @@ class Sizes(Initial):
         return shares
 
     def cumulative(self, sizes: Float) -> Float:
-        """See `Initial.cumulative`."""
         shares = np.concatenate(([0.0], self._shares()))
         return shares[np.searchsorted(self.sizes, sizes, side="right")]
 
     def quantile(self, share: Float) -> Int:
-        """See `Initial.quantile`."""
         index = np.searchsorted(self._shares(), share, side="right")
         return np.asarray(self.sizes, np.int64)[np.minimum(index, len(self.sizes) - 1)]
 
     def weighted(self, weights: Callable[[Float], Float]) -> Initial:
-        """See `Initial.weighted`."""
         found = np.array(self.densities_) * weights(np.array(self.sizes, float))
         return Sizes(self.sizes, tuple(found.tolist()))
 
@@ -81,7 +77,6 @@ class Sizes(Initial):
 
     @property
     def largest(self) -> int:
-        """See `Initial.largest`."""
         return max(s for s, d in zip(self.sizes, self.densities_, strict=True) if d > 0)
 
 

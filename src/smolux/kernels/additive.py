@@ -44,12 +44,10 @@ class Additive(Kernel):
 
     @property
     def degree(self) -> float:
-        """See `Kernel.degree`."""
         return 1.0
 
     @property
     def gels(self) -> bool:
-        """See `Kernel.gels`."""
         return False
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:

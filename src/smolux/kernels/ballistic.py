@@ -80,12 +80,10 @@ class Ballistic(Kernel):
 
     @property
     def degree(self) -> float:
-        """See `Kernel.degree`."""
         return 1.0 / 6.0
 
     @property
     def gels(self) -> bool:
-        """See `Kernel.gels`."""
         return False
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:

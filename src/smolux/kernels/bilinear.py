@@ -86,7 +86,6 @@ class Bilinear(Kernel):
 
     @property
     def gels(self) -> bool:
-        """See `Kernel.gels`."""
         return self.B > 0
 
     def gel_time(self) -> float | None:

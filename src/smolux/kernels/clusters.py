@@ -90,7 +90,6 @@ class Clusters(Kernel):
 
     @property
     def degree(self) -> float:
-        """See `Kernel.degree`."""
         return 2.0 * self.exponent
 
     @property
@@ -99,7 +98,6 @@ class Clusters(Kernel):
         return self.exponent > 0.5 or self.gel_time() == 0.0
 
     def gel_time(self) -> float | None:
-        """See `Kernel.gel_time`."""
         return 0.0 if self.exponent + 1.0 / self.dimension > 1.0 else None
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:

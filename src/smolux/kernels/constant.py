@@ -45,12 +45,10 @@ class Constant(Kernel):
 
     @property
     def degree(self) -> float:
-        """See `Kernel.degree`."""
         return 0.0
 
     @property
     def gels(self) -> bool:
-        """See `Kernel.gels`."""
         return False
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:

@@ -52,7 +52,6 @@ class FormulaKernel(OwnKernel):
         return self.declared_gels
 
     def to_dict(self) -> dict[str, Any]:
-        """See `Kernel.to_dict`."""
         stated = {"degree": self.degree, "gels": self.gels}
         return {
             "name": self.name,

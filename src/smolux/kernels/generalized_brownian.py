@@ -47,7 +47,6 @@ class GeneralizedBrownian(Kernel):
 
     @property
     def degree(self) -> float:
-        """See `Kernel.degree`."""
         return 0.0
 
     @property
@@ -56,7 +55,6 @@ class GeneralizedBrownian(Kernel):
         return abs(self.a) > 1
 
     def gel_time(self) -> float | None:
-        """See `Kernel.gel_time`."""
         return 0.0 if self.gels else None
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:

@@ -67,7 +67,6 @@ class Long(Kernel):
 
     @property
     def monomer(self) -> dict[str, float]:
-        """See `Kernel.monomer`."""
         return {"monomer_diameter": self.monomer_diameter}
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:

@@ -20,25 +20,20 @@ class MadeOfKernels(Kernel):
 
     @property
     def rigorous(self) -> bool:  # type: ignore[override]
-        """See `Kernel`."""
         return all(kernel.rigorous for kernel in self.made_of)
 
     @property
     def searched(self) -> bool:  # type: ignore[override]
-        """See `Kernel`."""
         return any(kernel.searched for kernel in self.made_of)
 
     @property
     def arbitrary(self) -> bool:  # type: ignore[override]
-        """See `Kernel`."""
         return any(kernel.arbitrary for kernel in self.made_of)
 
     @property
     def monomer(self) -> dict[str, float]:
-        """See `Kernel.monomer`."""
         return {key: x for kernel in self.made_of for key, x in kernel.monomer.items()}
 
     @property
     def singled_out(self) -> Float:
-        """See `Kernel.singled_out`."""
         return np.unique(np.concatenate([kernel.singled_out for kernel in self.made_of]))

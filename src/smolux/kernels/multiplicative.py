@@ -46,16 +46,13 @@ class Multiplicative(Kernel):
 
     @property
     def degree(self) -> float:
-        """See `Kernel.degree`."""
         return 2.0
 
     @property
     def gels(self) -> bool:
-        """See `Kernel.gels`."""
         return True
 
     def gel_time(self) -> float:
-        """See `Kernel.gel_time`."""
         return 1.0 / self.scale
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:

@@ -38,7 +38,6 @@ class OwnKernel(Kernel):
 
     @property
     def label(self) -> str:
-        """See `Kernel.label`."""
         return repr(self.law.text)
 
     @property
@@ -48,7 +47,6 @@ class OwnKernel(Kernel):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """See `Kernel.parameters`."""
         return self.law.parameters
 
     @cached_property
@@ -58,7 +56,6 @@ class OwnKernel(Kernel):
 
     @property
     def searched(self) -> bool:  # type: ignore[override]
-        """See `Kernel.searched`."""
         return self.law.stated is None
 
     def interval(self, i: Interval, j: Interval) -> Interval:
@@ -68,7 +65,6 @@ class OwnKernel(Kernel):
         return self.law.interval(i, j)
 
     def __call__(self, i: ArrayLike, j: ArrayLike) -> Float:
-        """See `Kernel.__call__`."""
         return self.law.on(i, j)
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:

@@ -53,12 +53,10 @@ class Product(Kernel):
 
     @property
     def degree(self) -> float:
-        """See `Kernel.degree`."""
         return 2.0 * self.mu
 
     @property
     def gels(self) -> bool:
-        """See `Kernel.gels`."""
         return self.mu > 0.5
 
     def gel_time(self) -> float | None:

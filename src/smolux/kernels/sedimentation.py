@@ -94,7 +94,6 @@ class Sedimentation(Kernel):
 
     @property
     def degree(self) -> float:
-        """See `Kernel.degree`."""
         return 4.0 / 3.0
 
     @property
@@ -103,7 +102,6 @@ class Sedimentation(Kernel):
         return True
 
     def gel_time(self) -> float:
-        """See `Kernel.gel_time`."""
         return 0.0
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:

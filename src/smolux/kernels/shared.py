@@ -113,7 +113,6 @@ class Shared(MadeOfKernels):
 
     @property
     def made_of(self) -> tuple[Kernel, ...]:
-        """See `MadeOfKernels`."""
         return self.kernel, self.share
 
     @property
@@ -123,7 +122,6 @@ class Shared(MadeOfKernels):
 
     @property
     def label(self) -> str:
-        """See `Kernel.label`."""
         return f"{self.kernel.label} times the share {self.share.label}"
 
     @property
@@ -139,7 +137,6 @@ class Shared(MadeOfKernels):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """See `Kernel.parameters`."""
         return (*self.kernel.parameters, *self.share.parameters)
 
     @property
@@ -148,7 +145,6 @@ class Shared(MadeOfKernels):
         return False if self.kernel.gels is False else None
 
     def __call__(self, i: ArrayLike, j: ArrayLike) -> Float:
-        """See `Kernel.__call__`."""
         part = self.share(i, j)
         return np.where((part >= 0.0) & (part <= WHOLE), self.kernel(i, j) * part, np.nan)
 
@@ -159,7 +155,6 @@ class Shared(MadeOfKernels):
         return widen(np.asarray(lower * least), np.asarray(upper * np.minimum(most, 1.0)))
 
     def interval(self, i: Interval, j: Interval) -> Interval:
-        """See `Kernel.interval`."""
         return self.kernel.interval(i, j) * self.share.interval(i, j)
 
     def majorant(self) -> Majorant | None:

@@ -100,7 +100,6 @@ class Shear(Kernel):
 
     @property
     def degree(self) -> float:
-        """See `Kernel.degree`."""
         return 1.0
 
     @property

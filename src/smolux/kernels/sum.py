@@ -79,7 +79,6 @@ class Sum(MadeOfKernels):
 
     @property
     def parts(self) -> tuple[tuple[float, Kernel], ...]:
-        """See `Kernel.parts`."""
         return tuple(zip(self.coefficients, self.terms, strict=True))
 
     @property
@@ -98,7 +97,6 @@ class Sum(MadeOfKernels):
 
     @property
     def made_of(self) -> tuple[Kernel, ...]:
-        """See `MadeOfKernels`."""
         return self.terms
 
     def __repr__(self) -> str:
@@ -106,7 +104,6 @@ class Sum(MadeOfKernels):
 
     @property
     def label(self) -> str:
-        """See `Kernel.label`."""
         return " + ".join(kernel.label for kernel in self.terms)
 
     @property
@@ -126,7 +123,6 @@ class Sum(MadeOfKernels):
 
     @property
     def cheap(self) -> bool:  # type: ignore[override]
-        """See `Kernel`."""
         return all(kernel.cheap for kernel in self.terms)
 
     @property
@@ -147,7 +143,6 @@ class Sum(MadeOfKernels):
         return True if any(known) else None if None in known else False
 
     def __call__(self, i: ArrayLike, j: ArrayLike) -> Float:
-        """See `Kernel.__call__`."""
         return np.asarray(sum(number * kernel(i, j) for number, kernel in self.parts))
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:
@@ -157,7 +152,6 @@ class Sum(MadeOfKernels):
         return lower, upper
 
     def interval(self, i: Interval, j: Interval) -> Interval:
-        """See `Kernel.interval`."""
         first, *others = (number * kernel.interval(i, j) for number, kernel in self.parts)
         for other in others:
             first = first + other
@@ -186,7 +180,6 @@ class Sum(MadeOfKernels):
         return {"name": self.name, "terms": [_term(c, k.to_dict()) for c, k in self.parts]}
 
     def describe(self) -> dict[str, Any]:
-        """See `Kernel.describe`."""
         return {
             "name": self.name,
             "terms": [_term(c, k.describe()) for c, k in self.parts],

@@ -101,5 +101,4 @@ class Transition(Kernel):
 
     @property
     def monomer(self) -> dict[str, float]:
-        """See `Kernel.monomer`."""
         return {"monomer_diameter": self.monomer_diameter, "density": self.density}

@@ -37,12 +37,10 @@ class Varying(MadeOfKernels):
 
     @property
     def made_of(self) -> tuple[Kernel, ...]:
-        """See `MadeOfKernels`."""
         return (self.kernel,)
 
     @property
     def in_time(self) -> tuple[tuple[TimeFunction, Kernel], ...]:
-        """See `Kernel.in_time`."""
         return ((self.factor, self.kernel),)
 
     def __repr__(self) -> str:
@@ -50,7 +48,6 @@ class Varying(MadeOfKernels):
 
     @property
     def label(self) -> str:
-        """See `Kernel.label`."""
         return f"{self.kernel.label} times {self.factor.text}"
 
     @property
@@ -65,17 +62,14 @@ class Varying(MadeOfKernels):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """See `Kernel.parameters`."""
         return self.kernel.parameters
 
     @property
     def cheap(self) -> bool:  # type: ignore[override]
-        """See `Kernel`."""
         return self.kernel.cheap
 
     @property
     def degree(self) -> float | None:
-        """See `Kernel.degree`."""
         return self.kernel.degree
 
     @property
@@ -88,15 +82,12 @@ class Varying(MadeOfKernels):
         return self.kernel(i, j)
 
     def bounds(self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> tuple[Float, Float]:
-        """See `Kernel.bounds`."""
         return self.kernel.bounds(a, b, c, d)
 
     def interval(self, i: Interval, j: Interval) -> Interval:
-        """See `Kernel.interval`."""
         return self.kernel.interval(i, j)
 
     def majorant(self) -> Majorant | None:
-        """See `Kernel.majorant`."""
         return self.kernel.majorant()
 
     def to_dict(self) -> dict[str, Any]:
@@ -108,7 +99,6 @@ class Varying(MadeOfKernels):
         return {**self.kernel.to_dict(), "varying": self.factor.text}
 
     def describe(self) -> dict[str, Any]:
-        """See `Kernel.describe`."""
         return {**self.kernel.describe(), "formula": self.formula, "varying": self.factor.text}
 
 

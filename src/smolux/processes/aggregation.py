@@ -55,11 +55,9 @@ class Aggregation(PairProcess):
 
     @property
     def factor(self) -> TimeFunction:
-        """See `Process.factor`."""
         with about("varying"):
             return TimeFunction.of(self.varying, "the factor of aggregation")
 
     @property
     def daughters(self) -> Merged:
-        """See `PairProcess.daughters`."""
         return Merged()

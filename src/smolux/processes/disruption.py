@@ -115,23 +115,19 @@ class CollisionalFragmentation(PairProcess):
 
     @property
     def entries(self) -> int:
-        """See `Process.entries`."""
         return len(self.shares)
 
     @property
     def parameters(self) -> tuple[Any, ...]:
-        """See `PairProcess.parameters`."""
         return (np.cumsum(self.shares),)
 
     @property
     def factor(self) -> TimeFunction:
-        """See `Process.factor`."""
         with about("rate"):
             return TimeFunction.of(self.rate, "the rate of collisional fragmentation")
 
     @property
     def daughters(self) -> Debris:
-        """See `PairProcess.daughters`."""
         shares = tuple(self.shares.tolist())
         return Debris(shares, partial(fragments, shares) if len(shares) > 1 else None)
 

@@ -60,16 +60,13 @@ class Evaporation(RatedBySize, UnaryProcess):
 
     @property
     def entries(self) -> int:
-        """See `Process.entries`."""
         return 2
 
     def rates(self, sizes: Float) -> Float:
-        """See `UnaryProcess.rates`."""
         return np.where(sizes > 1.0, self.of_size(sizes), 0.0)
 
     @property
     def daughters(self) -> Detached:
-        """See `UnaryProcess.daughters`."""
         return Detached(1)
 
     @classmethod

@@ -72,23 +72,19 @@ class Fragmentation(Varying, UnaryProcess):
 
     @property
     def entries(self) -> int:
-        """See `Process.entries`."""
         return 2
 
     @property
     def law(self) -> Callable[..., Any]:
-        """See `UnaryProcess.law`."""
         return self.pairs.rate
 
     @property
     def parameters(self) -> tuple[Any, ...]:
-        """See `UnaryProcess.parameters`."""
         return self.pairs.parameters
 
     def split_bounds(
         self, low: Float, high: Float, bounds: Callable[..., tuple[Float, Float]]
     ) -> tuple[Float, Float, Float, Any]:
-        """See `UnaryProcess.split_bounds`."""
         (a, b, c, d), widths = _bins(low, high)
         bound = bounds(a, b, c, d)[1]
         finite = np.isfinite(bound)
@@ -104,7 +100,6 @@ class Fragmentation(Varying, UnaryProcess):
 
     @property
     def daughters(self) -> Split:
-        """See `UnaryProcess.daughters`."""
         return Split(self.pairs)
 
 

@@ -69,10 +69,8 @@ class Removal(RatedBySize, UnaryProcess):
             raise InputError(problems)
 
     def rates(self, sizes: Float) -> Float:
-        """See `UnaryProcess.rates`."""
         return self.of_size(sizes)
 
     @property
     def daughters(self) -> Nothing:
-        """See `UnaryProcess.daughters`."""
         return Nothing()

@@ -58,5 +58,4 @@ class Shattering(PairProcess):
 
     @property
     def daughters(self) -> Debris:
-        """See `PairProcess.daughters`."""
         return Debris((1.0,))

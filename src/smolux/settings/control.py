@@ -18,7 +18,6 @@ class _Executor(Kind):
     """What takes tasks, or None."""
 
     def check(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         if value is None or callable(getattr(value, "submit", None)):
             return value
         cure = "must be a concurrent.futures.Executor, or None for threads"
@@ -42,7 +41,6 @@ class Control(Arguments):
 
     @classmethod
     def disagreements(cls, good: Mapping[str, Any]) -> list[str]:
-        """See `Arguments`."""
         executor = good.get("executor")
         if executor is None or isinstance(executor, ThreadPoolExecutor):
             return []

@@ -48,7 +48,6 @@ class Whole(Kind):
         self.least, self.most, self.optional = least, most, optional
 
     def check(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         if value is None and self.optional:
             return None
         number = whole(value)
@@ -69,7 +68,6 @@ class Number(Kind):
         self.holds, self.words, self.optional = holds, words, optional
 
     def check(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         if value is None and self.optional:
             return None
         if is_number(value) and self.holds(value):
@@ -93,7 +91,6 @@ class Choice(Kind):
         self.words = list(words)
 
     def check(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         if isinstance(value, str) and value in self.words:
             return value
         raise InputError([Problem(key, f"is unknown{did_you_mean(str(value), self.words)}", value)])
@@ -103,7 +100,6 @@ class Text(Kind):
     """A word, of which others know what it may be."""
 
     def check(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         return value
 
 
@@ -132,7 +128,6 @@ class Registered(Kind):
         return [*getattr(import_module(self.module), self.names), "auto"]
 
     def check(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         if isinstance(value, str) and (value == "auto" or value in self.words):
             return value
         if isinstance(value, getattr(import_module(self.module), self.base)):
@@ -156,7 +151,6 @@ class Registered(Kind):
         return {"name": value.name, **settings}
 
     def from_plain(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         if isinstance(value, str):
             return value
         settings = dict(value)
@@ -171,7 +165,6 @@ class Flag(Kind):
     """True or False."""
 
     def check(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         if isinstance(value, (bool, np.bool_)):
             return bool(value)
         raise InputError([Problem(key, "must be true or false", value)])
@@ -181,7 +174,6 @@ class _Sequence(Kind):
     """Numbers kept as a tuple."""
 
     def from_plain(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         return tuple(value)
 
 
@@ -189,7 +181,6 @@ class Orders(_Sequence):
     """Orders of moments."""
 
     def check(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         return tuple(orders_of_moments(value, key).tolist())
 
     def plain(self, value: Any) -> Any:
@@ -207,7 +198,6 @@ class Times(_Sequence):
         self.optional, self.start = optional, start
 
     def check(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         if value is None and self.optional:
             return None
         output = np.atleast_1d(numbers(key, value))
@@ -231,7 +221,6 @@ class Called(Kind):
         self.words = words
 
     def check(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         if value is None or callable(value):
             return value
         raise InputError([Problem(key, f"must be {self.words}", value)])
@@ -241,7 +230,6 @@ class File(Kind):
     """A file that can be written, or None."""
 
     def check(self, key: str, value: Any) -> Any:
-        """See `Kind`."""
         if value is None:
             return None
         if not isinstance(value, (str, os.PathLike)):

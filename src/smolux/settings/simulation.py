@@ -65,7 +65,6 @@ class Settings(Arguments):
 
     @classmethod
     def disagreements(cls, good: Mapping[str, Any]) -> list[str]:
-        """See `Arguments`."""
         problems: list[str] = []
 
         def known(*names: str) -> bool:

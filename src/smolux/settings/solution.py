@@ -40,7 +40,6 @@ class SolverSettings(Arguments):
 
     @classmethod
     def disagreements(cls, good: Mapping[str, Any]) -> list[str]:
-        """See `Arguments`."""
         window, most = good.get("window"), good.get("max_window")
         if window is None or most is None:
             return []
@@ -52,7 +51,6 @@ class SolverSettings(Arguments):
 
     @classmethod
     def against(cls, model: Model, given: Mapping[str, Any]) -> list[str]:
-        """See `Arguments`."""
         if given.get("gel") != "reacts" or model.only_aggregates:
             return []
         others = [p.name for p in model.processes if p.name != "aggregation"]

@@ -18,7 +18,7 @@ from smolux.settings import SpatialSettings
 
 from .methods import METHODS
 from .methods.base import Run, SpatialMethod
-from .results.replay import narrate
+from .results.replay import history
 from .results.trace import Trace, empty_series
 from .system import System
 
@@ -255,7 +255,7 @@ def _result(
     times = _default_times(trace) if output is None else output
     merging, series = None, trace.series
     if method.exact:
-        merging, series = narrate(system, trace.log, times, trace.time)
+        merging, series = history(system, trace.log, times, trace.time)
     elif series is None:
         series = empty_series(times, len(system), system.dimension)
     attributes = {

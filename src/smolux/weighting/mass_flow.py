@@ -41,16 +41,13 @@ class MassFlow(Weighting):
 
     @property
     def weight(self) -> Callable[..., Any]:
-        """See `Weighting.weight`."""
         return _weight
 
     @property
     def rate_ratio(self) -> Callable[..., Any]:
-        """See `Weighting.rate_ratio`."""
         return _ratio
 
     def interval(self, i: Interval, j: Interval) -> Interval:
-        """See `Weighting.interval`."""
         return power_interval(i, j, 1.0)
 
     def majorant(self, kernel: Kernel) -> Majorant | None:

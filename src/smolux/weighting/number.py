@@ -28,21 +28,16 @@ class Number(Weighting):
 
     @property
     def weight(self) -> None:
-        """See `Weighting.weight`."""
         return None
 
     def weights(self, sizes: ArrayLike) -> Float:
-        """See `Weighting.weights`."""
         return np.ones(np.shape(sizes))
 
     def arrays(self, kernel: Callable[[Any, Any], Float]) -> Callable[[Any, Any], Float]:
-        """See `Weighting.arrays`."""
         return kernel
 
     def bounds(self, kernel: Kernel) -> Callable[..., tuple[Float, Float]]:
-        """See `Weighting.bounds`."""
         return kernel.bounds
 
     def majorant(self, kernel: Kernel) -> Majorant | None:
-        """See `Weighting.majorant`."""
         return kernel.majorant()

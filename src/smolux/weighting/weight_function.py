@@ -99,31 +99,25 @@ class WeightFunction(Weighting):
 
     @property
     def weight(self) -> Callable[..., Any]:
-        """See `Weighting.weight`."""
         return self._law.rate if self.exponent is None else power
 
     @property
     def rate_ratio(self) -> Callable[..., Any] | None:
-        """See `Weighting.rate_ratio`."""
         return None if self.exponent is None else power_ratio
 
     @property
     def parameters(self) -> tuple[Any, ...]:
-        """See `Weighting.parameters`."""
         return self._law.parameters if self.exponent is None else (self.exponent,)
 
     @property
     def settings(self) -> dict[str, Any]:
-        """See `Weighting.settings`."""
         return {"w": self._law.text if self.exponent is None else self.exponent}
 
     @property
     def rigorous(self) -> bool:
-        """See `Weighting.rigorous`."""
         return self.exponent is not None or self._law.rigorous
 
     def weights(self, sizes: ArrayLike) -> Float:
-        """See `Weighting.weights`."""
         if self.exponent is not None:
             return super().weights(sizes)
         # a function that takes no arrays is slow, and the same few sizes come in many pairs
@@ -131,7 +125,6 @@ class WeightFunction(Weighting):
         return self._law(found)[place].reshape(np.shape(sizes))
 
     def interval(self, i: Interval, j: Interval) -> Interval:
-        """See `Weighting.interval`."""
         if self.exponent is not None:
             return power_interval(i, j, self.exponent)
         one, two = self._law.interval(i), self._law.interval(j)

@@ -29,7 +29,6 @@ class Additive(FiniteLaw):
     reference: ClassVar[str] = "J. Pitman, J. Comb. Theory A 85, 165 (1999)"
 
     def number_pmf(self, t: float) -> Float:
-        """See `FiniteLaw.number_pmf`."""
         k = np.arange(1.0, self.particles + 1)
         return np.concatenate(([0.0], np.exp(self._log_number(self._clock(t), k))))
 
@@ -41,7 +40,6 @@ class Additive(FiniteLaw):
         return binomial(n - 1, k - 1) - n * clock * (k - 1) + (n - k) * math.log(merged)
 
     def number_moments(self, t: float) -> tuple[float, float]:
-        """See `FiniteLaw.number_moments`."""
         left = math.exp(-self.particles * self._clock(t))
         expected = (self.particles - 1) * left
         return 1 + expected, expected * -math.expm1(-self.particles * self._clock(t))

@@ -74,7 +74,6 @@ class Constant(FiniteLaw):
     reference: ClassVar[str] = "J. F. C. Kingman, Stoch. Process. Appl. 13, 235 (1982)"
 
     def number_pmf(self, t: float) -> Float:
-        """See `FiniteLaw.number_pmf`."""
         return self._number_pmf(self._clock(t))
 
     def _number_pmf(self, clock: float) -> Float:

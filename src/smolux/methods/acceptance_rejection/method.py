@@ -55,13 +55,11 @@ class AcceptanceRejection(Method):
 
     @staticmethod
     def bind(rate: Any, tally: Any) -> Pieces:
-        """See `Method.bind`."""
         return bind(rate, tally)
 
     def new_work(
         self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int
     ) -> Work:
-        """See `Method.new_work`."""
         total = np.array([counts.sum() for _, counts in populations])
         monomers = np.array([c[0] if s[0] == 1 else 0 for s, c in populations])
         stored = total - monomers
@@ -85,7 +83,6 @@ class AcceptanceRejection(Method):
         return Work(array, ahead, level, apart, edges, np.full((levels, levels), np.nan), table)
 
     def grow(self, work: Work, state: State) -> Work:
-        """See `Method.grow`."""
         return work._replace(sizes=enlarged(work.sizes, 2 * work.sizes.shape[1]))
 
     def supply_bound(self, work: Work, rates: Rates, state: State, replica: int) -> None:
@@ -119,12 +116,10 @@ class AcceptanceRejection(Method):
                 count[WORST_I], count[WORST_J] = smallest, largest
 
     def held(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
-        """See `Method.held`."""
         count = state.count[replica]
         return np.array([0, count[MONOMERS]]), work.sizes[replica, : count[STORED]]
 
     def bytes_per_replica(self, particles: int) -> int:
-        """See `Method.bytes_per_replica`."""
         return 8 * particles
 
 

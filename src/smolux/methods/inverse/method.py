@@ -45,7 +45,6 @@ class Inverse(Method):
 
     @staticmethod
     def bind(rate: Any, tally: Any) -> Pieces:
-        """See `Method.bind`."""
         return bind(rate, tally)
 
     def __post_init__(self) -> None:
@@ -55,7 +54,6 @@ class Inverse(Method):
     def new_work(
         self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int
     ) -> Work:
-        """See `Method.new_work`."""
         replicas = len(populations)
         # no size can exceed the mass, so small systems need few buckets
         buckets = min(self.buckets, max(BLOCK, 2 * mass))
@@ -86,17 +84,14 @@ class Inverse(Method):
         )
 
     def grow(self, work: Work, state: State) -> Work:
-        """See `Method.grow`."""
         capacity = 2 * work.large.shape[1]
         return work._replace(
             large=enlarged(work.large, capacity), large_rate=enlarged(work.large_rate, capacity)
         )
 
     def held(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
-        """See `Method.held`."""
         number = work.number[replica].astype(np.int64)
         return np.append(0, number), work.large[replica, : state.count[replica, STORED]]
 
     def bytes_per_replica(self, particles: int) -> int:
-        """See `Method.bytes_per_replica`."""
         return 8 * 6 * self.buckets

@@ -75,7 +75,6 @@ class LowRank(Method):
 
     @staticmethod
     def bind(rate: Any, tally: Any) -> Pieces:
-        """See `Method.bind`."""
         return bind(rate, tally)
 
     def _tables(self, rates: Rates) -> tuple[Tables, np.ndarray, int]:
@@ -93,7 +92,6 @@ class LowRank(Method):
     def new_work(
         self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int
     ) -> Work:
-        """See `Method.new_work`."""
         tables, bound, bits = self._tables(rates)
         edges = slot_edges(bits)
         replicas = len(populations)
@@ -143,7 +141,6 @@ class LowRank(Method):
         )
 
     def grow(self, work: Work, state: State) -> Work:
-        """See `Method.grow`."""
         meta = work.meta
         pool = max(int(meta[:, POOL_NEEDED].max()), work.pool.shape[1])
         slots = _padded(int(meta[:, SLOTS_NEEDED].max()))
@@ -164,7 +161,6 @@ class LowRank(Method):
         return more
 
     def growth(self, work: Work, state: State) -> int:
-        """See `Method.growth`."""
         meta, found = work.meta, 0
         wide = bool(state.sizes.max() > meta[0, WIDEST])
         pool = max(int(meta[:, POOL_NEEDED].max()), work.pool.shape[1])
@@ -200,7 +196,6 @@ class LowRank(Method):
                 state.count[replica, (WORST_I, WORST_J)] = smallest, largest
 
     def held(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
-        """See `Method.held`."""
         number = work.number[replica].astype(np.int64)
         counted = 2 << int(work.bits[0])
         first = work.start[replica, counted:]
@@ -209,7 +204,6 @@ class LowRank(Method):
         return number[:counted], np.concatenate([*parts, np.zeros(0, np.int64)])
 
     def bytes_per_replica(self, particles: int) -> int:
-        """See `Method.bytes_per_replica`."""
         return 6 * particles + 8 * 20 * (1 << self.bits) * 16
 
 

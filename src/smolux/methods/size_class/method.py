@@ -57,7 +57,6 @@ class SizeClass(Method):
 
     @staticmethod
     def bind(rate: Any, tally: Any) -> Pieces:
-        """See `Method.bind`."""
         return pieces.bind(rate, tally)
 
     def __post_init__(self) -> None:
@@ -72,7 +71,6 @@ class SizeClass(Method):
     def new_work(
         self, rates: Rates, populations: list[tuple[Int, Int]], state: State, mass: int
     ) -> Work:
-        """See `Method.new_work`."""
         replicas = len(populations)
         total = np.array([counts.sum() for _, counts in populations])
         bits = self._bits(int(total.max()))
@@ -111,7 +109,6 @@ class SizeClass(Method):
         return _more_chunks(work)
 
     def growth(self, work: Work, state: State) -> int:
-        """See `Method.growth`."""
         classes, wide = self._lacks(work, state)
         if classes > work.number.shape[1]:
             fixed = work.pool.nbytes + work.free.nbytes
@@ -148,13 +145,11 @@ class SizeClass(Method):
             )
 
     def held(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
-        """See `Method.held`."""
         number, single = work.number[replica], int(work.meta[0, SINGLE])
         lists = [_members(work, replica, g) for g in range(single, len(number)) if number[g]]
         return number[:single], np.concatenate([*lists, np.zeros(0, np.int64)])
 
     def split(self, work: Work, state: State, number: int, copies: int, words: Words) -> list[Part]:
-        """See `Method.split`."""
         return split(work, number, copies, words)
 
     def collect(self, rates: Rates, parts: list[Part], state: State, mass: int) -> Work:
@@ -176,7 +171,6 @@ class SizeClass(Method):
         return bits, span, int(state.count[0, SINCE]), work.flow[0], work.high, work.low
 
     def carry_over(self, work: Work, state: State, carried: list[Any]) -> None:
-        """See `Method.carry_over`."""
         carried = [found for found in carried if found[0] == work.meta[0, BITS]]
         for _, _, _, _, high, low in carried:
             n = min(high.shape[1], work.high.shape[1])
@@ -190,7 +184,6 @@ class SizeClass(Method):
             work.flow[0, :n] = flow[:n]
 
     def bytes_per_replica(self, particles: int) -> int:
-        """See `Method.bytes_per_replica`."""
         # as for monomers: four bytes a particle, and what grows with the classes
         bits, chunk = self._bits(particles), _chunk(particles)
         classes = _class_of(2 * particles, bits) + (_OCTAVES << bits)

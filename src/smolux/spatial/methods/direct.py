@@ -80,7 +80,6 @@ class DirectRun(Run):
         return self.logger.events
 
     def advance(self, until: float, clusters: int, budget: int) -> str | None:
-        """See `Run.advance`."""
         room = self._direct.Events(*self.logger.room)
         # an event takes time of the order of the number of pairs
         few = max(1, min(budget, 100_000_000 // len(self.system) ** 2))
@@ -89,7 +88,6 @@ class DirectRun(Run):
         return reasons(self._direct).get(code, None) if code != self._direct.DONE else ""
 
     def trace(self) -> Trace:
-        """See `Run.trace`."""
         _, least, which = np.unique(self.discs.label, return_index=True, return_inverse=True)
         return Trace(
             self.time, self.discs.x.copy(), self.discs.v.copy(),
@@ -118,7 +116,6 @@ class AllPairs(SpatialMethod):
     reference: ClassVar[str] = "Degond, Dimarco, Ferreira, Hecht, appendix A"
 
     def start(self, system: System, times: Float) -> Run:
-        """See `SpatialMethod.start`."""
         cells = np.ones(system.dimension, np.int64)
         return DirectRun(system, "bind_all_pairs", cells, self.patience)
 
@@ -150,7 +147,6 @@ class Cells(SpatialMethod):
     reference: ClassVar[str] = "Degond, Dimarco, Ferreira, Hecht, section A.6"
 
     def start(self, system: System, times: Float) -> Run:
-        """See `SpatialMethod.start`."""
         diameter = 2 * float(system.radius.max())
         cells = cells_for(system.box, self.side * diameter, len(system))
         return DirectRun(system, "bind_cells", cells, self.patience)

@@ -156,7 +156,6 @@ class SteppingRun(Run):
         return int(self.state.count[self._steps.STEPS])
 
     def advance(self, until: float, clusters: int, budget: int) -> str | None:
-        """See `Run.advance`."""
         stepping, times = self._stepping, self.series.time
         look = float(times[self._next]) if self._next < len(times) else np.inf
         few = max(1, min(budget, 4_000_000 // len(self.system)))
@@ -190,7 +189,6 @@ class SteppingRun(Run):
         self._next += 1
 
     def trace(self) -> Trace:
-        """See `Run.trace`."""
         s, steps = self.state, self._steps
         least = np.full(len(s.x), len(s.x), np.int32)
         np.minimum.at(least, s.label, np.arange(len(s.x), dtype=np.int32))
@@ -309,5 +307,4 @@ class TimeStepping(SpatialMethod):
         )
 
     def start(self, system: System, times: Float) -> Run:
-        """See `SpatialMethod.start`."""
         return SteppingRun(system, times, self)

@@ -305,7 +305,6 @@ class WindowedRun(Run):
         return self.logger.events
 
     def advance(self, until: float, clusters: int, budget: int) -> str | None:
-        """See `Run.advance`."""
         flight = self._flight
         code, done = self._loop(
             self.flight, self._events(*self.logger.room), until, clusters,
@@ -317,7 +316,6 @@ class WindowedRun(Run):
         return "" if code == flight.DONE else reasons(flight).get(code)
 
     def trace(self) -> Trace:
-        """See `Run.trace`."""
         f, flight, d = self.flight, self._flight, self.system.dimension
         name = f.disc[:, flight.NAME]
         own = f.block[f.disc[:, flight.BLOCK], flight.CLUSTER]

@@ -47,7 +47,7 @@ class Merging:
     gap: Float
 
 
-class Player:
+class Replay:
     """Goes through a log from its start."""
 
     def __init__(self, system: System, log: Log) -> None:
@@ -76,7 +76,7 @@ class Player:
         )
         self._work = np.empty((4, d))
 
-    def play(self, until: float) -> None:
+    def to(self, until: float) -> None:
         """Go on through all events up to a time, that time included."""
         stop = int(np.searchsorted(self.log.time, until, side="right"))
         merges = self._compiled.Merges(*vars(self.merging).values())
@@ -94,7 +94,7 @@ class Player:
         return forest.size[roots], forest.mass[roots], forest.velocity[roots]
 
     def positions(self, time: float) -> tuple[Float, Float, NDArray[np.int32]]:
-        """Return position, velocity and cluster of every disc at a time, up to which was played."""
+        """Return position, velocity and cluster of every disc at a time, to which it has gone."""
         n, d = self.system.position.shape
         x, v = np.empty((n, d)), np.empty((n, d))
         label, least = np.empty(n, np.int32), np.empty(n, np.int32)
@@ -104,22 +104,22 @@ class Player:
         return x, v, label
 
 
-def narrate(system: System, log: Log, times: Float, reached: float) -> tuple[Merging, Series]:
+def history(system: System, log: Log, times: Float, reached: float) -> tuple[Merging, Series]:
     """Describe every merge, and observe at the output times up to that which was reached."""
-    player = Player(system, log)
+    replay = Replay(system, log)
     series = empty_series(times, len(system), system.dimension)
     for k, time in enumerate(times):
         if time > reached:
             break
-        player.play(float(time))
-        observe(series, k, *player.clusters())
-    player.play(np.inf)
-    return player.merging, series
+        replay.to(float(time))
+        observe(series, k, *replay.clusters())
+    replay.to(np.inf)
+    return replay.merging, series
 
 
 def replayed(system: System, log: Log, time: float) -> dict[str, Any]:
     """Return position, velocity and cluster of all discs at a time."""
-    player = Player(system, log)
-    player.play(time)
-    x, v, label = player.positions(time)
+    replay = Replay(system, log)
+    replay.to(time)
+    x, v, label = replay.positions(time)
     return {"position": x, "velocity": v, "cluster": label}

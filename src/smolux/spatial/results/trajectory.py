@@ -17,7 +17,7 @@ from smolux.runtime.files import replacing
 from smolux.spatial.box import Box
 from smolux.spatial.system import System
 
-from .replay import Player
+from .replay import Replay
 from .result import log_of, system_of
 
 Float = NDArray[np.float64]
@@ -102,10 +102,10 @@ def instants_of(result: xr.DataTree, times: ArrayLike | None, frames: int) -> Fl
 def states(result: xr.DataTree, instants: Float) -> Any:
     """Yield time, positions, velocities and clusters of all discs, going through a run once."""
     system, log = system_of(result), log_of(result)
-    player = Player(system, log)
+    replay = Replay(system, log)
     for time in instants:
-        player.play(float(time))
-        yield float(time), *player.positions(float(time))
+        replay.to(float(time))
+        yield float(time), *replay.positions(float(time))
 
 
 def _cell(system: System) -> tuple[list[float], list[bool]]:
