@@ -16,8 +16,8 @@ import pytest
 import smolux as sx
 from shared import QUICK, extinction
 from smolux.errors import InputError
-from smolux.stochastic.assembly import rates_for
 from smolux.stochastic.planning import make_plan
+from smolux.stochastic.rates import rates_for
 
 METHODS = [method.name for method in sx.methods.METHODS]
 #: the law of `MassFlow`, which is compiled without a power; see `test_processes`

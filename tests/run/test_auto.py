@@ -10,7 +10,7 @@ import pytest
 import smolux as sx
 from shared import FORMULA
 from smolux.methods.choose import Circumstances, choose, effort
-from smolux.stochastic.assembly import rates_for
+from smolux.stochastic.rates import rates_for
 from smolux.weighting import Number
 
 AGGREGATION = [sx.processes.Aggregation()]

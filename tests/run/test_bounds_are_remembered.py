@@ -20,7 +20,7 @@ from smolux.functions.law import Law
 from smolux.kernels import Additive
 from smolux.runtime import files
 from smolux.stochastic import remembered, tables
-from smolux.stochastic.assembly import rates_for
+from smolux.stochastic.rates import rates_for
 from smolux.weighting import MassFlow, Number, WeightFunction
 
 BOXES = [np.array(side, float) for side in ([1, 2, 9], [1, 3, 11], [2, 2, 40], [4, 3, 47])]

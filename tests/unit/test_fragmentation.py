@@ -15,7 +15,7 @@ from smolux.core.slots import slot_edges
 from smolux.core.state import UNARY_BITS, State, new_state
 from smolux.functions.user_function import Function
 from smolux.processes import Fragmentation
-from smolux.stochastic import assembly
+from smolux.stochastic import parameters as parameters_of
 
 #: any power of the product, in one compiled function
 LAW = "(i*j)**p"
@@ -71,8 +71,8 @@ def test_bounds_of_a_slot_hold_for_its_largest_size() -> None:
     for slot, top in zip(range(slots.start, slots.stop), EDGES[1:][slots] - 1.0, strict=True):
         law = sx.kernels.formula("1 + 20*max(0, 1 - abs(i + j - top))", top=top)
         processes = [sx.processes.Aggregation(), Fragmentation(law)]
-        parameters = assembly.factor_parameters(processes)
-        assembly.bound_splits(processes, parameters, 20_000)
+        parameters = parameters_of.factor_parameters(processes)
+        parameters_of.bound_splits(processes, parameters, 20_000)
         known = parameters.unary[0][1]
         assert known.bounds[slot - splits._FIRST].max() >= 21.0 * (top // 2)
 

@@ -11,7 +11,7 @@ import smolux as sx
 from smolux.core.slots import slot_edges
 from smolux.kernels import KERNELS, Kernel, Majorant
 from smolux.methods.low_rank.majorants import fill_bounds, fitted, from_powers
-from smolux.stochastic.assembly import rates_for
+from smolux.stochastic.rates import rates_for
 from smolux.weighting import Number
 
 #: no scale is one, which hides what lacks it

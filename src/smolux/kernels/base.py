@@ -16,6 +16,7 @@ from smolux.functions.intervals import Interval
 from smolux.functions.stated import Stated
 from smolux.functions.time import TimeFunction
 
+from .check import law_problems
 from .majorant import Majorant
 
 Float = NDArray[np.float64]
@@ -246,8 +247,6 @@ class Kernel:
         largest : float
             The largest size at the start.
         """
-        from .check import law_problems
-
         return law_problems(self, largest)
 
     def to_dict(self) -> dict[str, Any]:

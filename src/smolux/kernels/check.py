@@ -3,17 +3,36 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from smolux.errors import InputError
 
-if TYPE_CHECKING:
-    from .base import Kernel
-
 Float = NDArray[np.float64]
+
+
+class Law(Protocol):
+    """What is asked of a kernel, see `smolux.kernels.base.Kernel`."""
+
+    @property
+    def label(self) -> str: ...
+    @property
+    def degree(self) -> float | None: ...
+    @property
+    def vanishes(self) -> bool: ...
+    @property
+    def rigorous(self) -> bool: ...
+    @property
+    def singled_out(self) -> Float: ...
+
+    def bounds(
+        self, a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike
+    ) -> tuple[Float, Float]: ...
+
+    def __call__(self, i: ArrayLike, j: ArrayLike) -> Float: ...
+
 
 #: all sizes up to this are in the sample
 _SMALL = 16
@@ -41,7 +60,7 @@ def verdict(value: float) -> str:
     return f"infinite; {_LIMIT}" if np.isinf(value) else _NEGATIVE
 
 
-def law_problems(kernel: Kernel, largest: float) -> list[str]:
+def law_problems(kernel: Law, largest: float) -> list[str]:
     """Return what is wrong with a law; see `Kernel.problems`."""
     where = f"kernel {kernel.label}"
     sizes = np.unique(np.concatenate([sample_sizes(largest), kernel.singled_out]))
@@ -85,7 +104,7 @@ def law_problems(kernel: Kernel, largest: float) -> list[str]:
     return problems or _declared(kernel, where, sizes, values, i, j)
 
 
-def _raised(kernel: Kernel, where: str, i: Float, j: Float, error: Exception) -> str:
+def _raised(kernel: Law, where: str, i: Float, j: Float, error: Exception) -> str:
     for x, y in zip(i, j, strict=True):
         try:
             kernel(x, y)
@@ -97,7 +116,7 @@ def _raised(kernel: Kernel, where: str, i: Float, j: Float, error: Exception) ->
 
 
 def _declared(
-    kernel: Kernel, where: str, sizes: Float, values: Float, i: Float, j: Float
+    kernel: Law, where: str, sizes: Float, values: Float, i: Float, j: Float
 ) -> list[str]:
     """Compare the degree and the bounds that the law states with its values."""
     problems = []

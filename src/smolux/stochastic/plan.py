@@ -22,7 +22,8 @@ from smolux.settings.population import doubles_at
 from smolux.settings.target_error import StoppingRule
 from smolux.weighting.base import Weighting
 
-from .assembly import loop_for, rates_for
+from .assembly import loop_for
+from .rates import rates_for
 from .time_windows import inflow, time_windows_for
 
 

@@ -58,7 +58,8 @@ from smolux.model import Model
 from smolux.processes.base import PairProcess, UnaryProcess, text_of
 from smolux.runtime import room
 
-from .assembly import bound_splits, factor_parameters, uncompilable
+from .assembly import uncompilable
+from .parameters import bound_splits, factor_parameters
 from .plan import Plan
 from .remembered import spent
 

@@ -6,9 +6,10 @@ kernel, with shattering too, the whole Markov chain on the partitions of a small
 """
 
 from .additive import Additive
-from .base import FiniteLaw, find, law, number_mean, number_variance
+from .base import FiniteLaw
 from .chain import collision_moments, partition_pmf, partitions
 from .constant import Constant
+from .find import find, law, number_mean, number_variance
 from .multiplicative import Multiplicative
 
 __all__ = [

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from smolux.errors import InputError, did_you_mean
+from smolux.errors import InputError
 from smolux.exact.base import check_sizes
 
 if TYPE_CHECKING:
-    from smolux.model import Model
+    pass
 
 Float = NDArray[np.float64]
 
@@ -159,72 +159,3 @@ class FiniteLaw:
 def log_repeats(sizes: Float) -> float:
     """Logarithm of the product of ``n_s!`` over the numbers ``n_s`` of equal sizes."""
     return sum(math.lgamma(c + 1) for c in np.unique(sizes, return_counts=True)[1])
-
-
-def law(
-    kernel: str, particles: int, *, volume: float | None = None, scale: float = 1.0
-) -> FiniteLaw:
-    """Return the finite law of a kernel.
-
-    Parameters
-    ----------
-    kernel : {"constant", "additive", "multiplicative"}
-    particles : int
-        Monomers at the start.
-    volume : float, optional
-        As large as `particles` if left out.
-    scale : float
-        Prefactor of the kernel.
-    """
-    from . import Additive, Constant, Multiplicative
-
-    laws = {c.name: c for c in (Constant, Additive, Multiplicative)}
-    if kernel not in laws:
-        raise InputError(
-            f"kernel = {kernel!r}: no finite law is known{did_you_mean(str(kernel), list(laws))}"
-        )
-    return laws[kernel](particles, volume, scale)
-
-
-def find(model: Model, particles: int) -> FiniteLaw | None:
-    """Find the finite law of a model simulated with a number of particles, in a fixed volume.
-
-    Parameters
-    ----------
-    model : Model
-    particles : int
-        At the start; the volume is ``particles / density``.
-
-    Returns
-    -------
-    FiniteLaw or None
-        None if no closed law is known.
-    """
-    from smolux.exact.additive import Additive
-    from smolux.exact.constant import Constant
-    from smolux.exact.find import solution
-    from smolux.exact.multiplicative import Multiplicative
-
-    exact = solution(model)
-    names = {Constant: "constant", Additive: "additive", Multiplicative: "multiplicative"}
-    if exact is None or type(exact) not in names:
-        return None
-    name = names[type(exact)]
-    return law(name, particles, volume=particles / exact.density, scale=exact.scale)
-
-
-def number_mean(
-    kernel: str, particles: int, t: float, *, volume: float | None = None, scale: float = 1.0
-) -> float:
-    """Mean number of clusters at the time `t`; see `law` for the parameters."""
-    return law(kernel, particles, volume=volume, scale=scale).number_mean(t)
-
-
-def number_variance(
-    kernel: str, particles: int, t: float, *, volume: float | None = None, scale: float = 1.0
-) -> float:
-    """Variance of the number of clusters at the time `t`; see `law` for the parameters.
-
-    Each collision takes one cluster away, so this is also the variance of the number of collisions.
-    """
-    return law(kernel, particles, volume=volume, scale=scale).number_variance(t)
