@@ -7,7 +7,7 @@ import pytest
 import synthetic
 
 from smolux.analysis import sweep_table
-from smolux.analysis.sweeps import gather
+from smolux.analysis.sweeps import combine_sweep
 
 AXES = {"density": [1.0, 2.0, 4.0], "speed": [1.0, 10.0]}
 
@@ -17,7 +17,7 @@ def test_each_point_has_its_place_and_the_table_its_last_time():
     ends = {(c, v): c * v for c in AXES["density"] for v in AXES["speed"]}
     points = [synthetic.solver_dataset(times=(0.0, end)) for end in ends.values()]
     points = [ds.assign_coords(time=[0.0, 1.0]) for ds in points]
-    found = gather(AXES, points, [""] * 6)
+    found = combine_sweep(AXES, points, [""] * 6)
     for (c, v), end in ends.items():
         number = found["number_density"].sel(density=c, speed=v).values
         np.testing.assert_allclose(number, [[1.0, 2 / (2 + end)]])
