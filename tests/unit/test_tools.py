@@ -11,6 +11,7 @@ from numba import njit
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
+from tools import layers  # noqa: E402
 from tools.assembly import digest, normalised  # noqa: E402
 from tools.side_by_side import argument_sets  # noqa: E402
 
@@ -39,3 +40,9 @@ def test_argument_sets_are_right_and_wrong_and_the_same_each_time(word):
     sets = argument_sets(50)
     assert str(sets) == str(argument_sets(50))
     assert len({str(given[word]) for given in sets}) > 1
+
+
+def test_the_figure_of_the_layers_is_that_of_the_contract():
+    """``python tools/layers.py`` draws it anew."""
+    assert layers.FIGURE.read_text(encoding="utf-8") == layers.drawn()
+    assert {row[0] for row in layers.layers()} == set(layers.WORDS)

@@ -13,7 +13,7 @@ from smolux.errors import InputError
 Float = NDArray[np.float64]
 
 
-class Law(Protocol):
+class _Law(Protocol):
     """What is asked of a kernel, see `smolux.kernels.base.Kernel`."""
 
     @property
@@ -60,7 +60,7 @@ def verdict(value: float) -> str:
     return f"infinite; {_LIMIT}" if np.isinf(value) else _NEGATIVE
 
 
-def law_problems(kernel: Law, largest: float) -> list[str]:
+def law_problems(kernel: _Law, largest: float) -> list[str]:
     """Return what is wrong with a law; see `Kernel.problems`."""
     where = f"kernel {kernel.label}"
     sizes = np.unique(np.concatenate([sample_sizes(largest), kernel.singled_out]))
@@ -104,7 +104,7 @@ def law_problems(kernel: Law, largest: float) -> list[str]:
     return problems or _declared(kernel, where, sizes, values, i, j)
 
 
-def _raised(kernel: Law, where: str, i: Float, j: Float, error: Exception) -> str:
+def _raised(kernel: _Law, where: str, i: Float, j: Float, error: Exception) -> str:
     for x, y in zip(i, j, strict=True):
         try:
             kernel(x, y)
@@ -116,7 +116,7 @@ def _raised(kernel: Law, where: str, i: Float, j: Float, error: Exception) -> st
 
 
 def _declared(
-    kernel: Law, where: str, sizes: Float, values: Float, i: Float, j: Float
+    kernel: _Law, where: str, sizes: Float, values: Float, i: Float, j: Float
 ) -> list[str]:
     """Compare the degree and the bounds that the law states with its values."""
     problems = []
