@@ -1,6 +1,6 @@
 """Draw the layers of the package, as the import contract in ``pyproject.toml`` has them, as SVG.
 
-``python tools/layers.py`` writes the figure of the architecture page; a test holds the two together.
+``python tools/layers.py`` writes the figure of the architecture page; a test compares the two.
 """
 
 from __future__ import annotations

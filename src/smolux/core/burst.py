@@ -44,7 +44,7 @@ NOT_PLAIN, PLAIN, LAST = 0, 1, 2
 
 
 class Burst(NamedTuple):
-    """What a method brings for bursts; `held` is a tuple of its own, of what changes.
+    """What a method brings for bursts; `held` is a tuple of those of its numbers that change.
 
     Attributes
     ----------
@@ -56,9 +56,10 @@ class Burst(NamedTuple):
         As `Pieces.draw`: the waiting time, the slots of the pair (-1: nothing happens then) and
         its sizes, the candidates looked at so far and the four words of the random generator.
     replace : ``replace(w, held, first, second, gone, size, count)``
-        Take one of the pair or both out (bits 1 and 2) and put `count` particles of a size in:
-        `PLAIN`, or `LAST` if `Pieces.prepare` has to look at what that made; `NOT_PLAIN`, with
-        nothing changed, if it is not within the room or the bounds in force. And what is held then.
+        Take one of the pair or both out (bits 1 and 2) and put `count` particles of a size in.
+        Returns `PLAIN`, or `LAST` if `Pieces.prepare` must look at the store after this event, or
+        `NOT_PLAIN`, with nothing changed, if the store lacks room or the size breaks the bounds in
+        force; and `held` as it is after the event.
     release : ``release(s, held)``
         Write what is held to the state.
     """
