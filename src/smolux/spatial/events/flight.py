@@ -110,6 +110,9 @@ class Flight(NamedTuple):
 
     Attributes
     ----------
+    axes : tuple of d integers
+        The axes 0 to d - 1. The compiler knows how many there are, so that loops over axes are
+        unrolled.
     clock, count : of shape (CLOCKS,), (COUNTS,)
     length, period : of shape (d,)
         The box.
@@ -131,6 +134,7 @@ class Flight(NamedTuple):
         Work space.
     """
 
+    axes: tuple[int, ...]
     clock: np.ndarray
     count: np.ndarray  # type: ignore[assignment]
     length: np.ndarray

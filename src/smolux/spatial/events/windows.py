@@ -12,7 +12,7 @@ import numpy as np
 
 from smolux.jit.compile import cold_piece, entry, piece
 
-from . import listing, predicting
+from . import listing
 from .flight import (
     AT_REST,
     BATCH,
@@ -68,6 +68,7 @@ from .flight import (
 from .geometry import FILLED, larger, shift, smaller
 from .heap import is_current, pop
 from .pairs import remove_all, splice
+from .predicting import look_ahead, next_wall, predict_all, predict_listed, speed
 
 #: differences of velocity below this share of the largest speed come from rounding
 REST = 1e-13
@@ -88,7 +89,6 @@ LIST_COST, CHECK_COST, PREDICT_COST = 1.3, 1.0, 12.0
 def bind(d):
     """Bind the loop for `d` dimensions."""
     bring, empty, list_blocks, rebin_chain = listing.bind(d)
-    speed, next_wall, look_ahead, predict_listed, predict_all = predicting.bind(d)
     since, mass, way = 2 * d + SINCE, 2 * d + MASS, 2 * d + WAY
 
     @piece

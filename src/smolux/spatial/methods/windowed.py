@@ -202,6 +202,7 @@ class WindowedRun(Run):
         )
         event = _rows(events, when=("f8", 1), event=("i4", 2))
         return flight.Flight(
+            axes=tuple(range(d)),
             clock=self.clock,
             count=self.count,
             length=np.array(self.system.box.lengths),
