@@ -26,6 +26,15 @@ def smaller(a, b):
 
 
 @piece
+def power(x, axes):
+    """Return the product of as many factors `x` as there are axes."""
+    product = x
+    for _ in range(len(axes) - 1):
+        product *= x
+    return product
+
+
+@piece
 def apart(s):
     """Begin the sums that `contact_time` needs, for two discs whose radii add up to `s`.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,13 +28,6 @@ _LISTED, _THIN = 1.25, 1e-3
 _PAIRS, _EVENTS = 1.75, 1.75
 #: discs of one cluster share a block from this mean size on
 _BLOCKS_FROM = 4.0
-
-
-@cache
-def _loop(dimension: int) -> Callable[..., Any]:
-    from smolux.spatial.events import windows
-
-    return windows.bind(dimension)
 
 
 def _rows(count: int, **columns: tuple[str, int]) -> NDArray[Any]:
@@ -113,12 +105,12 @@ class WindowedRun(Run):
     """A run of the windowed method."""
 
     def __init__(self, system: System, settings: Windowed, before: Trace | None = None) -> None:
-        from smolux.spatial.events import direct, flight, geometry, packing
+        from smolux.spatial.events import direct, flight, geometry, packing, windows
 
         self.system, self.settings = system, settings
         self._flight, self._packing, self._events = flight, packing, direct.Events
         n, d = system.position.shape
-        self._loop = _loop(d)
+        self._loop = windows.fly
         self.logger = Logger(min(_ROOM, 16 * n + 4096), d)
         self.work, self.near = np.zeros((4, d)), np.zeros((3, 3), np.int64)
         box, widest = system.box, 2 * float(system.radius.max())
