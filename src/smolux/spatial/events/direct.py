@@ -16,6 +16,7 @@ from .geometry import (
     apart,
     contact_time,
     other_image,
+    power,
     shift,
     smaller,
     wall_time,
@@ -49,8 +50,12 @@ class Events(NamedTuple):
 
 
 class Discs(NamedTuple):
-    """Discs on their way, the box, the grid of the cells and some scratch of length d."""
+    """Discs on their way, the box, the grid of the cells and some scratch of length d.
 
+    The `axes`, 0 to d - 1, are known to the compiler: loops over axes are unrolled.
+    """
+
+    axes: tuple[int, ...]
     clock: np.ndarray
     x: np.ndarray
     v: np.ndarray
@@ -70,8 +75,9 @@ class Discs(NamedTuple):
 
 
 @piece
-def pair_time(discs, i, j, d, images):
+def pair_time(discs, i, j, images):
     """Time to the contact of two discs, from the nearest image or the `images` nearest."""
+    d = len(discs.axes)
     s, best = discs.radius[i] + discs.radius[j], math.inf
     for code in range(images):
         sums = apart(s)
@@ -86,8 +92,9 @@ def pair_time(discs, i, j, d, images):
 
 
 @piece
-def images_of(discs, widest, d):
+def images_of(discs, widest):
     """How many images of a disc to look at, and the gap to any other one along periodic axes."""
+    d = len(discs.axes)
     images, gap = 1, math.inf
     for k in range(d):
         period = discs.period[k]
@@ -100,8 +107,9 @@ def images_of(discs, widest, d):
 
 
 @piece
-def fastest(discs, d):
+def fastest(discs):
     """Largest speed; never grows, as merging averages velocities."""
+    d = len(discs.axes)
     square = 0.0
     for i in range(discs.x.shape[0]):
         s = 0.0
@@ -111,165 +119,181 @@ def fastest(discs, d):
     return math.sqrt(square)
 
 
-def bind_all_pairs(d):
-    """Bind the search over all pairs in `d` dimensions."""
-
-    @piece
-    def search(discs, best, widest):
-        first, second = np.int64(-1), np.int64(-1)
-        n = discs.x.shape[0]
-        # beyond that other images may come first
-        images, reach = images_of(discs, widest, d)
-        if reach < math.inf:
-            best = min(best, reach / (2.0 * fastest(discs, d)))
-        for i in range(n):
-            for j in range(i + 1, n):
-                if discs.label[i] != discs.label[j]:
-                    t = pair_time(discs, i, j, d, images)
-                    if t < best or (t == best and first < 0):
-                        best, first, second = t, np.int64(i), np.int64(j)
-        return best, first, second
-
-    return search
+@piece
+def search_all_pairs(discs, best, widest):
+    """Time to the next contact and its discs, over all pairs; `best` and -1 if none is before."""
+    first, second = np.int64(-1), np.int64(-1)
+    n = discs.x.shape[0]
+    # beyond that other images may come first
+    images, reach = images_of(discs, widest)
+    if reach < math.inf:
+        best = min(best, reach / (2.0 * fastest(discs)))
+    for i in range(n):
+        for j in range(i + 1, n):
+            if discs.label[i] != discs.label[j]:
+                t = pair_time(discs, i, j, images)
+                if t < best or (t == best and first < 0):
+                    best, first, second = t, np.int64(i), np.int64(j)
+    return best, first, second
 
 
-def bind_cells(d):
-    """Bind the search over the pairs in neighbouring cells in `d` dimensions."""
+@piece
+def bin_all(discs):
+    """Put all discs into their cells."""
+    d = len(discs.axes)
+    discs.head[:] = -1
+    for i in range(discs.x.shape[0]):
+        for k in range(d):
+            x, period = discs.x[i, k], discs.period[k]
+            discs.binned[i, k] = x - period * math.floor(x / period) if period > 0.0 else x
+        insert(i, discs.binned[i], discs.length, discs.cells, discs.head, discs.following)
 
-    @piece
-    def bin_all(discs):
-        discs.head[:] = -1
+
+@piece
+def reach_of_cells(discs, widest):
+    """Images to look at, and the gap of two discs at least if their cells are no neighbours."""
+    d = len(discs.axes)
+    side = math.inf
+    for k in range(d):
+        if discs.cells[k] > 1:
+            side = min(side, discs.length[k] / discs.cells[k])
+    # nor may another image come first
+    images, gap = images_of(discs, widest)
+    return images, min(side - widest, gap)
+
+
+@piece
+def search_cells(discs, best, widest):
+    """Time to the next contact and its discs, over pairs in neighbouring cells; else as above."""
+    clock = discs.clock
+    images, gap = reach_of_cells(discs, widest)
+    if clock[TIME] >= clock[EDGE]:
+        bin_all(discs)
+        # the gap closes at twice the largest speed at most
+        clock[EDGE] = clock[TIME] + gap / (2.0 * fastest(discs))
+    best = min(best, clock[EDGE] - clock[TIME])
+    first, second = np.int64(-1), np.int64(-1)
+    for i in range(discs.x.shape[0]):
+        for code in range(power(3, discs.axes)):
+            c = neighbour(discs.binned[i], code, discs.length, discs.period, discs.cells)
+            j = np.int64(discs.head[c] if c >= 0 else -1)
+            while j >= 0:
+                if j > i and discs.label[i] != discs.label[j]:
+                    t = pair_time(discs, i, j, images)
+                    earlier = first < 0 or (first == i and j < second)
+                    if t < best or (t == best and earlier):
+                        best, first, second = t, np.int64(i), j
+                j = np.int64(discs.following[j])
+    return best, first, second
+
+
+@piece
+def next_wall(discs):
+    """Time to the next touch of a wall, the disc and the axis."""
+    d = len(discs.axes)
+    best, disc, axis = math.inf, -1, -1
+    for i in range(discs.x.shape[0]):
+        for k in range(d):
+            if discs.period[k] == 0.0:
+                x, room = discs.x[i, k], discs.room[i]
+                t = wall_time(x - room, x + room, discs.v[i, k], discs.length[k])
+                if t < best:
+                    best, disc, axis = t, i, k
+    return best, disc, axis
+
+
+@piece
+def still(discs):
+    """Whether nothing can meet: no motion along reflecting axes, one along periodic ones."""
+    d = len(discs.axes)
+    for k in range(d):
+        low, high = discs.v[0, k], discs.v[0, k]
         for i in range(discs.x.shape[0]):
+            low, high = min(low, discs.v[i, k]), max(high, discs.v[i, k])
+        spread = high - low if discs.period[k] > 0.0 else max(high, -low)
+        if spread > REST * discs.clock[SCALE]:
+            return False
+    return True
+
+
+@piece
+def reflect(discs, disc, axis):
+    """Turn the cluster of a disc back; return what to log."""
+    d = len(discs.axes)
+    label, low, high = discs.label[disc], math.inf, -math.inf
+    for i in range(discs.x.shape[0]):
+        if discs.label[i] == label:
+            low = min(low, discs.x[i, axis] - discs.room[i])
+            high = max(high, discs.x[i, axis] + discs.room[i])
+    fills = high - low >= discs.length[axis] * (1.0 - FILLED)
+    for i in range(discs.x.shape[0]):
+        if discs.label[i] == label:
+            discs.v[i, axis] = 0.0 if fills else -discs.v[i, axis]
+    return -1 - axis - (d if fills else 0)
+
+
+@piece
+def merge(discs, first, second):
+    """Make one cluster of those of two discs; the larger one keeps its images."""
+    d = len(discs.axes)
+    a, b = discs.label[first], discs.label[second]
+    sign = 1.0
+    if discs.size[b] > discs.size[a]:
+        a, b, sign = b, a, -1.0
+    ma, mb = discs.mass[a], discs.mass[b]
+    for k in range(d):
+        discs.move[k] = sign * shift(discs.x[second, k] - discs.x[first, k], discs.period[k])
+        v = (ma * discs.v[a, k] + mb * discs.v[b, k]) / (ma + mb)
+        discs.mean[k] = v
+    for i in range(discs.x.shape[0]):
+        label = discs.label[i]
+        if label in (a, b):
             for k in range(d):
-                x, period = discs.x[i, k], discs.period[k]
-                discs.binned[i, k] = x - period * math.floor(x / period) if period > 0.0 else x
-            insert(i, discs.binned[i], discs.length, discs.cells, discs.head, discs.following)
-
-    @piece
-    def reach(discs, widest):
-        """Images to look at, and the gap of two discs at least if their cells are no neighbours."""
-        side = math.inf
-        for k in range(d):
-            if discs.cells[k] > 1:
-                side = min(side, discs.length[k] / discs.cells[k])
-        # nor may another image come first
-        images, gap = images_of(discs, widest, d)
-        return images, min(side - widest, gap)
-
-    @piece
-    def search(discs, best, widest):
-        clock = discs.clock
-        images, gap = reach(discs, widest)
-        if clock[TIME] >= clock[EDGE]:
-            bin_all(discs)
-            # the gap closes at twice the largest speed at most
-            clock[EDGE] = clock[TIME] + gap / (2.0 * fastest(discs, d))
-        best = min(best, clock[EDGE] - clock[TIME])
-        first, second = np.int64(-1), np.int64(-1)
-        for i in range(discs.x.shape[0]):
-            for code in range(3**d):
-                c = neighbour(discs.binned[i], code, discs.length, discs.period, discs.cells)
-                j = np.int64(discs.head[c] if c >= 0 else -1)
-                while j >= 0:
-                    if j > i and discs.label[i] != discs.label[j]:
-                        t = pair_time(discs, i, j, d, images)
-                        earlier = first < 0 or (first == i and j < second)
-                        if t < best or (t == best and earlier):
-                            best, first, second = t, np.int64(i), j
-                    j = np.int64(discs.following[j])
-        return best, first, second
-
-    return search
+                discs.v[i, k] = discs.mean[k]
+                if label == b:
+                    discs.x[i, k] += discs.move[k]
+            discs.label[i] = a
+    discs.mass[a] = ma + mb
+    discs.size[a] += discs.size[b]
 
 
-def bind(make_search, d):
-    """Bind the loop of a reference method."""
-    search = make_search(d)
+@piece
+def extents(discs):
+    """Return the largest diameter, and the longest side of the box."""
+    widest, longest = 0.0, 0.0
+    for i in range(discs.x.shape[0]):
+        widest = max(widest, 2.0 * discs.radius[i])
+    for k in range(len(discs.axes)):
+        longest = max(longest, discs.length[k])
+    return widest, longest
 
-    @piece
-    def next_wall(discs):
-        """Time to the next touch of a wall, the disc and the axis."""
-        best, disc, axis = math.inf, -1, -1
-        for i in range(discs.x.shape[0]):
-            for k in range(d):
-                if discs.period[k] == 0.0:
-                    x, room = discs.x[i, k], discs.room[i]
-                    t = wall_time(x - room, x + room, discs.v[i, k], discs.length[k])
-                    if t < best:
-                        best, disc, axis = t, i, k
-        return best, disc, axis
 
-    @piece
-    def still(discs):
-        """Whether nothing can meet: no motion along reflecting axes, one along periodic ones."""
-        for k in range(d):
-            low, high = discs.v[0, k], discs.v[0, k]
-            for i in range(discs.x.shape[0]):
-                low, high = min(low, discs.v[i, k]), max(high, discs.v[i, k])
-            spread = high - low if discs.period[k] > 0.0 else max(high, -low)
-            if spread > REST * discs.clock[SCALE]:
-                return False
-        return True
+@piece
+def move_all(discs, dt):
+    """Move all discs on."""
+    for i in range(discs.x.shape[0]):
+        for k in range(len(discs.axes)):
+            discs.x[i, k] += discs.v[i, k] * dt
 
-    @piece
-    def reflect(discs, disc, axis):
-        """Turn the cluster of a disc back; return what to log."""
-        label, low, high = discs.label[disc], math.inf, -math.inf
-        for i in range(discs.x.shape[0]):
-            if discs.label[i] == label:
-                low = min(low, discs.x[i, axis] - discs.room[i])
-                high = max(high, discs.x[i, axis] + discs.room[i])
-        fills = high - low >= discs.length[axis] * (1.0 - FILLED)
-        for i in range(discs.x.shape[0]):
-            if discs.label[i] == label:
-                discs.v[i, axis] = 0.0 if fills else -discs.v[i, axis]
-        return -1 - axis - (d if fills else 0)
 
-    @piece
-    def merge(discs, first, second):
-        """Make one cluster of those of two discs; the larger one keeps its images."""
-        a, b = discs.label[first], discs.label[second]
-        sign = 1.0
-        if discs.size[b] > discs.size[a]:
-            a, b, sign = b, a, -1.0
-        ma, mb = discs.mass[a], discs.mass[b]
-        for k in range(d):
-            discs.move[k] = sign * shift(discs.x[second, k] - discs.x[first, k], discs.period[k])
-            v = (ma * discs.v[a, k] + mb * discs.v[b, k]) / (ma + mb)
-            discs.mean[k] = v
-        for i in range(discs.x.shape[0]):
-            label = discs.label[i]
-            if label in (a, b):
-                for k in range(d):
-                    discs.v[i, k] = discs.mean[k]
-                    if label == b:
-                        discs.x[i, k] += discs.move[k]
-                discs.label[i] = a
-        discs.mass[a] = ma + mb
-        discs.size[a] += discs.size[b]
+def bind(search):
+    """Bind the loop of a reference method to its search for the next contact."""
 
     def advance(discs, log, until, target, patience, budget):
         clock = discs.clock
-        n = discs.x.shape[0]
-        widest, longest = 0.0, 0.0
-        for i in range(n):
-            widest = max(widest, 2.0 * discs.radius[i])
-        for k in range(d):
-            longest = max(longest, discs.length[k])
+        widest, longest = extents(discs)
         done = 0
         while clock[CLUSTERS] > target and clock[TIME] < until:
             if done == budget or done == log.time.shape[0]:
                 return BUDGET, done
             if still(discs):
                 return AT_REST, done
-            if (clock[TIME] - clock[LATEST]) * fastest(discs, d) > patience * longest:
+            if (clock[TIME] - clock[LATEST]) * fastest(discs) > patience * longest:
                 return LONELY, done
             wall, disc, axis = next_wall(discs)
             left = until - clock[TIME]
             dt, first, second = search(discs, min(wall, left), widest)
-            for i in range(n):
-                for k in range(d):
-                    discs.x[i, k] += discs.v[i, k] * dt
+            move_all(discs, dt)
             clock[TIME] = until if dt == left else clock[TIME] + dt
             if first >= 0:
                 merge(discs, first, second)
@@ -287,3 +311,7 @@ def bind(make_search, d):
         return DONE, done
 
     return entry(advance)
+
+
+by_all_pairs = bind(search_all_pairs)
+by_cells = bind(search_cells)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,27 +22,21 @@ Int = NDArray[np.int64]
 _ROOM = 4096
 
 
-@cache
-def _loop(search: str, dimension: int) -> Callable[..., Any]:
-    from smolux.spatial.events import direct
-
-    return direct.bind(getattr(direct, search), dimension)
-
-
 class DirectRun(Run):
     """A run of a reference method."""
 
     def __init__(
-        self, system: System, search: str, cells: NDArray[np.int64], patience: float
+        self, system: System, loop: str, cells: NDArray[np.int64], patience: float
     ) -> None:
         from smolux.spatial.events import direct
 
         n, d = system.position.shape
         contact = system.wall_contact == "surface"
         self.system, self.patience = system, patience
-        self._direct, self._loop = direct, _loop(search, d)
+        self._direct, self._loop = direct, getattr(direct, loop)
         fast = float(np.sqrt((system.velocity**2).sum(1).max()))
         self.discs = direct.Discs(
+            tuple(range(d)),
             np.array([0.0, n, 0.0, 0.0, fast]),
             system.position.copy(),
             system.velocity.copy(),
@@ -117,7 +109,7 @@ class AllPairs(SpatialMethod):
 
     def start(self, system: System, times: Float) -> Run:
         cells = np.ones(system.dimension, np.int64)
-        return DirectRun(system, "bind_all_pairs", cells, self.patience)
+        return DirectRun(system, "by_all_pairs", cells, self.patience)
 
 
 @dataclass(frozen=True)
@@ -149,4 +141,4 @@ class Cells(SpatialMethod):
     def start(self, system: System, times: Float) -> Run:
         diameter = 2 * float(system.radius.max())
         cells = cells_for(system.box, self.side * diameter, len(system))
-        return DirectRun(system, "bind_cells", cells, self.patience)
+        return DirectRun(system, "by_cells", cells, self.patience)
