@@ -12,7 +12,7 @@ import smolux.spatial as sp
 from shared import stopped
 from smolux import InputError, SmoluxWarning
 from smolux.spatial import TimeStepping
-from smolux.spatial.methods import time_stepping
+from smolux.spatial.events.stepping import advance
 
 # a step that fails is taken again; whether one does may depend on the last bit
 pytestmark = pytest.mark.filterwarnings(
@@ -208,7 +208,7 @@ def test_short_steps_in_a_dense_system_do_not_fail():
 def test_the_compiled_loop_can_be_kept():
     """A loop that is given a compiled function as a value is compiled in every process anew."""
     sp.simulate(sp.lattice(16, 0.2, seed=2), "time-stepping", times=[0.0])
-    compiled = list(time_stepping._loop(2).overloads.values())
+    compiled = list(advance.overloads.values())
     assert compiled
     assert not any(c.library.has_dynamic_globals for c in compiled)
 

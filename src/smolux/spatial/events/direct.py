@@ -15,6 +15,7 @@ from .geometry import (
     add_axis,
     apart,
     contact_time,
+    largest,
     other_image,
     power,
     shift,
@@ -258,17 +259,6 @@ def merge(discs, first, second):
 
 
 @piece
-def extents(discs):
-    """Return the largest diameter, and the longest side of the box."""
-    widest, longest = 0.0, 0.0
-    for i in range(discs.x.shape[0]):
-        widest = max(widest, 2.0 * discs.radius[i])
-    for k in range(len(discs.axes)):
-        longest = max(longest, discs.length[k])
-    return widest, longest
-
-
-@piece
 def move_all(discs, dt):
     """Move all discs on."""
     for i in range(discs.x.shape[0]):
@@ -281,7 +271,7 @@ def bind(search):
 
     def advance(discs, log, until, target, patience, budget):
         clock = discs.clock
-        widest, longest = extents(discs)
+        widest, longest = 2.0 * largest(discs.radius), largest(discs.length)
         done = 0
         while clock[CLUSTERS] > target and clock[TIME] < until:
             if done == budget or done == log.time.shape[0]:

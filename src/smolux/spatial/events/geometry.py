@@ -26,6 +26,15 @@ def smaller(a, b):
 
 
 @piece
+def largest(values):
+    """Return the largest of some numbers that are not negative."""
+    found = 0.0
+    for value in values:
+        found = larger(found, value)
+    return found
+
+
+@piece
 def power(x, axes):
     """Return the product of as many factors `x` as there are axes."""
     product = x

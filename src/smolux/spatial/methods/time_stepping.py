@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -44,13 +42,6 @@ _HOPELESS = (
 )
 
 
-@cache
-def _loop(dimension: int) -> Callable[..., Any]:
-    from smolux.spatial.events import stepping
-
-    return stepping.bind(dimension)
-
-
 class SteppingRun(Run):
     """A run of the time-stepping method."""
 
@@ -60,7 +51,7 @@ class SteppingRun(Run):
         n, d = system.position.shape
         self.system, self.settings = system, settings
         self._steps, self._stepping, self._events = steps, stepping, direct.Events
-        self._loop = _loop(d)
+        self._loop = stepping.advance
         self.logger = Logger(max(1 << 14, 2 * (d + 2) * n), 0)
         self.series, self._next = empty_series(times, n, d), 0
         alpha, beta, damping, augmentation = settings.coefficients()
@@ -112,7 +103,7 @@ class SteppingRun(Run):
         room = system.radius if system.wall_contact == "surface" else np.zeros(n)
         each, ints, edges = np.arange(n, dtype=np.int32), (n, np.int32), 2 * _EDGES[d] * n
         return steps.Steps(
-            clock=clock, count=count,
+            axes=tuple(range(d)), clock=clock, count=count,
             length=np.array(system.box.lengths), period=system.box.periods,
             x=system.position.copy(), radius=system.radius, room=room, inertia=system.mass,
             label=each.copy(), member=each.copy(), binned=np.empty((n, d)),
