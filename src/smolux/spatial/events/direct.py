@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from smolux.jit.compile import entry, piece
+from smolux.jit.compile import cold_piece, entry, piece
 
 from .geometry import (
     FILLED,
@@ -120,7 +120,7 @@ def fastest(discs):
     return math.sqrt(square)
 
 
-@piece
+@cold_piece
 def search_all_pairs(discs, best, widest):
     """Time to the next contact and its discs, over all pairs; `best` and -1 if none is before."""
     first, second = np.int64(-1), np.int64(-1)
@@ -163,7 +163,7 @@ def reach_of_cells(discs, widest):
     return images, min(side - widest, gap)
 
 
-@piece
+@cold_piece
 def search_cells(discs, best, widest):
     """Time to the next contact and its discs, over pairs in neighbouring cells; else as above."""
     clock = discs.clock
