@@ -125,7 +125,7 @@ def search_all_pairs(discs, best, widest):
     """Time to the next contact and its discs, over all pairs; `best` and -1 if none is before."""
     first, second = np.int64(-1), np.int64(-1)
     n = discs.x.shape[0]
-    # beyond that other images may come first
+    # beyond this reach other images than those looked at may come first
     images, reach = images_of(discs, widest)
     if reach < math.inf:
         best = min(best, reach / (2.0 * fastest(discs)))

@@ -16,7 +16,7 @@ TIME = 0
 LATEST = 1  # time of the latest merge
 SCALE = 2  # largest speed at the start
 SKIN = 3  # pairs whose surfaces are nearer than this are listed
-BUDGET_OF_WAY = 4  # how far a cluster may move before it is listed anew: half of the skin
+BUDGET_OF_WAY = 4  # way of a cluster until the next listing: half of the skin
 WINDOW = 5  # end of the window
 LONGEST = 6  # longest side of the box
 THICKEST = 7  # the skin is at most this thick
@@ -42,14 +42,14 @@ MARK_LISTED = 14  # the same when the skin was last judged
 MARK_CHECKED = 15
 MARK_PREDICTED = 16
 PACKED = 17  # window before which discs were put into the order of space
-IMAGES = 18  # of a disc that are looked at: 1, or the nearest two along each axis
+IMAGES = 18  # of a disc to be looked at: 1, or the nearest two along each axis
 COUNTS = 19
 
 # Columns of Flight.body after displacement and velocity, which take 2 d.
 SINCE = 0  # time of the displacement
 HORIZON = 1  # until when contacts are predicted
 MASS = 2  # 0: merged into another one
-WAY = 3  # moved since it was listed
+WAY = 3  # of the cluster since its listing
 BODY = 4
 
 #: pairs whose discs, blocks and clusters are fetched together
@@ -74,8 +74,8 @@ RESKIN = 6  # blocks are to be made anew, for the skin of the clock
 # Columns of Flight.disc.
 NAME, BLOCK = 0, 1
 
-# Columns of Flight.block: first disc, cluster, next block of the cluster, cell, next block of it,
-# level of the radius of its discs, from that of the smallest ones on.
+# Columns of Flight.block: first disc, cluster, next block of the cluster, cell, next block of the
+# cell, level of the radius of its discs, counted from the smallest discs on.
 FIRST, CLUSTER, CHAIN, CELL, NEXT, LEVEL = 0, 1, 2, 3, 4, 5
 BLOCK_COLUMNS = 6
 
@@ -90,18 +90,18 @@ WIDEST, EXTENT = 0, 1
 MIXED = np.int32(1 << 30)
 
 # Columns of Flight.group: first and last block, number of blocks and of discs, first and last
-# half-edge, number of the latest state, and of the listing: 2 n to be listed in batch n, 2 n + 1 if
-# that is done.
+# half-edge, number of the latest state, and of the listing: 2 n to be listed in batch n, 2 n + 1
+# once batch n is listed.
 START, END, BLOCKS, DISCS, EDGE, LAST_EDGE, STAMP, LISTED_IN = 0, 1, 2, 3, 4, 5, 6, 7
 GROUP_COLUMNS = 8
 
-# Columns of Flight.half_edge: those before and after it in the list of a cluster, its disc. Pair p
-# is that of half-edges 2 p and 2 p + 1; the first one has the number of its latest prediction.
+# Columns of Flight.half_edge: half-edges before and after in the list of a cluster, the disc. Pair
+# p has half-edges 2 p and 2 p + 1; the first has the number of the latest prediction of the pair.
 BEFORE, AFTER, DISC, VERSION = 0, 1, 2, 3
 EDGE_COLUMNS = 4
 
-# Columns of Flight.event. An event is that of a pair, or -1 - the number of a cluster; it is out of
-# date unless WHICH is the version of the pair or the state of the cluster.
+# Columns of Flight.event. WHAT is a pair, or -1 - the number of a cluster; an event is out of date
+# unless WHICH is the version of the pair or the state of the cluster.
 WHAT, WHICH = 0, 1
 
 

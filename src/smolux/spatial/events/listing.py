@@ -1,7 +1,7 @@
 """Which pairs may meet: blocks are binned, and pairs nearer than the skin listed.
 
 A pair that is not listed had a gap of a skin when one of its clusters was listed last, and
-neither has moved half a skin since its own listing: it cannot have met.
+neither has moved half a skin since its own listing: the two cannot have met.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def centre(f, b, k, t):
     """Component of the centre of a block at a time."""
     d = len(f.axes)
     body = f.body
-    c = np.uint32(f.block[b, CLUSTER])  # without a sign an index is not checked for it
+    c = np.uint32(f.block[b, CLUSTER])  # unsigned: no check for a negative index
     moved = body[c, k] + body[c, d + k] * (t - body[c, 2 * d + SINCE])
     return f.place[b, k] + moved
 
@@ -227,7 +227,7 @@ def look_into(f, b, cell, start, t, batch, forward, x, dx, reach):
                 checked += 1
                 look(f, b, np.uint32(q), t, still, x, dx, reach)
         q = block[q, NEXT]
-    if alone:  # others have left, or become one with this
+    if alone:  # other clusters have left the cell, or become one with that of the block
         head[cell] ^= MIXED
     f.count[CHECKED] += checked
 
@@ -238,7 +238,7 @@ def look_at_level(f, b, level, t, batch, x, dx, near):
     d = len(f.axes)
     scale, cells, own = f.scale, f.cells, np.int64(f.block[b, LEVEL])
     reach = 0.5 * (scale[own, d + WIDEST] + scale[level, d + WIDEST]) + f.clock[SKIN]
-    # it may have moved half a skin since it was binned, and lies around the centre of its block
+    # a disc may have moved half a skin since it was binned, and lies around the centre of its block
     far = reach + 0.5 * f.clock[SKIN] + scale[level, d + EXTENT]
     near[2, 0], near[2, 1] = 0, 1
     for k in range(d):
@@ -318,7 +318,7 @@ def fold(f, t):
 def list_blocks(f, groups, b, stop, t, batch, work, near):
     """List blocks, which are in their cells, of the clusters up to a number.
 
-    Of cluster `b` if that is none: the chain from block `b` up to, not with, `stop`. With
+    Of cluster `b` if `groups` is 0: the chain from block `b` up to, not with, `stop`. With
     `batch` zero all blocks, one after the other, else those of clusters to be listed in it.
     """
     group = f.group

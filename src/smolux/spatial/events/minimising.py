@@ -22,7 +22,7 @@ from .steps import (
     SLOTS,
 )
 
-# What came out of it.
+# What came out of a minimisation.
 PARTED = 0
 FAILED = 1
 RELOAD = 2  # discs moved beyond what the lists allow for
@@ -33,7 +33,7 @@ STRANGERS = 0  # of clusters that do not touch
 FENCED = 1  # must not overlap
 LINKED = 2  # and are drawn to each other
 
-#: iterations between two looks at the coefficients, and the largest of them
+#: iterations between two looks at the coefficients, and the largest coefficient
 _TERM, _STIFFEST = 20, 30.0
 
 
@@ -117,7 +117,7 @@ def activate(s, local, i):
         j = np.int64(s.head[cell] if cell >= 0 else -1)
         while j >= 0:
             b = np.int64(s.slot[j])
-            # pairs with those that are active are listed already; so is the disc itself
+            # pairs with active discs are listed already; the disc itself is active
             if b < 0 or not local.active[b]:
                 square, c = 0.0, s.label[j]
                 for k in range(d):
@@ -161,7 +161,7 @@ def load(s, local, recipe, begin):
             local.near[p, 2] = FENCED
     for q in range(begin, s.count[CONTACTS]):
         a, b = s.slot[s.contact[q, 0]], s.slot[s.contact[q, 1]]
-        # listed by the one that was active first
+        # the pair was listed by the disc that was active first
         if local.first[b] < local.first[a]:
             a, b = b, a
         p = local.first[a]

@@ -75,7 +75,7 @@ def order(x, label, length, period, cells, span, counts, perm, opens):
         c = cell_of_disc(x, i, length, period, cells)
         perm[counts[c]] = i
         counts[c] += 1
-    # now the start of a cell is where the one before it ends
+    # now a cell starts where the cell before ends
     start = 0
     for c in range(counts.shape[0] - 1):
         stop = counts[c]

@@ -87,7 +87,7 @@ def predict(f, p, t):
         f.rel,
         f.place,
     )
-    # without a sign an index is not checked for it
+    # unsigned: no check for a negative index
     i, j = np.uint32(half_edge[2 * p, DISC]), np.uint32(half_edge[2 * p + 1, DISC])
     g, h = np.uint32(disc[i, BLOCK]), np.uint32(disc[j, BLOCK])
     m, n = np.uint32(block[g, CLUSTER]), np.uint32(block[h, CLUSTER])
@@ -132,7 +132,7 @@ def look_ahead(f, c, stop, batch):
     """Set until when clusters fly freely: up to a wall, or to the end of their way.
 
     Of all clusters ``c .. stop - 1`` that are there and, if `batch` is not zero, were listed in
-    it.
+    that batch.
     """
     d = len(f.axes)
     since, mass, way, horizon = 2 * d + SINCE, 2 * d + MASS, 2 * d + WAY, 2 * d + HORIZON

@@ -165,7 +165,7 @@ def list_pairs(s):
     """List the pairs nearer than the skin; False if there is no room."""
     fold(s)
     skin, around = s.clock[SKIN], power(3, s.axes)
-    # cells hold all that a disc may come to know of
+    # cells so wide that neighbours hold all discs that a disc may come to know of
     lay_grid(s, s.clock[REACH] * s.clock[WIDEST] + skin)
     bin_all(s, around)
     found, checked = 0, 0

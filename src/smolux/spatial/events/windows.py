@@ -1,7 +1,7 @@
 """The loop of the windowed method.
 
-A window ends before any cluster has moved half a skin since it was listed. Those that might in the
-next one are listed anew at its start, slow ones every few windows only.
+A window ends before any cluster has moved half a skin since it was listed. Clusters that might
+in the next window are listed anew at its start, slow ones every few windows only.
 """
 
 from __future__ import annotations
@@ -204,7 +204,7 @@ def open_window(f, patience, work, near):
                 due += group[c, BLOCKS]
     clock[WINDOW] = t + length
     if due > MOST * f.place.shape[0] and f.count[WINDOWS] - f.count[PACKED] > FRESH:
-        return RESKIN  # all are listed anyway: bring them into the order of space before
+        return RESKIN  # all blocks are listed anyway: first into the order of space
     if due > MOST * f.place.shape[0]:
         relist_all(f, work, near)
     elif due > 0:
@@ -292,7 +292,7 @@ def merge(f, p, t, work, near):
         mean = (ma * body[a, d + k] + mb * body[b, d + k]) / (ma + mb)
         square += mean * mean
     ahead = math.sqrt(square) * (f.clock[WINDOW] - t)
-    # a cluster has moved as far as its part that has moved most since it was listed
+    # the way of the new cluster is that of the part that has moved most since its listing
     keep_small, keep_large = other + ahead <= limit, mine + ahead <= limit
     if not keep_small:
         strike(f, b)
