@@ -14,6 +14,7 @@ __version__ = "0.1.0"
 
 _MODULES = (
     "analysis",
+    "attributes",
     "case",
     "conformance",
     "deterministic",
@@ -60,6 +61,7 @@ __all__ = [
     "WorkerError",
     "__version__",
     "analysis",
+    "attributes",
     "case",
     "conformance",
     "deterministic",
@@ -87,6 +89,7 @@ __all__ = [
 if TYPE_CHECKING:
     from . import (
         analysis,
+        attributes,
         case,
         conformance,
         deterministic,

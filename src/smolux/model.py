@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .errors import InputError, Problem
+from .attributes import Attribute, Composition
+from .errors import InputError, Problem, did_you_mean
 from .initial import Initial, monodisperse
 from .kernels.base import Kernel
 from .kernels.constant import Constant
@@ -32,6 +33,8 @@ class Model:
         has a label: ``Removal(0.1), Removal("0.1/k", label="wall")``.
     initial : Initial
         Sizes at time zero, see `smolux.initial`; monomers of unit density if left out.
+    attributes : sequence of Attribute
+        What particles carry beside their size, see `smolux.attributes`; nothing if left out.
 
     Raises
     ------
@@ -43,15 +46,18 @@ class Model:
     kernel: Kernel
     processes: Sequence[Process] = field(default_factory=lambda: (Aggregation(),))
     initial: Initial = field(default_factory=monodisperse)
+    attributes: Sequence[Attribute] = ()
 
     def __post_init__(self) -> None:
         problems = []
+        attributes = _several(self.attributes, (Attribute, str))
+        object.__setattr__(self, "attributes", attributes)
         if not isinstance(self.kernel, Kernel):
             problems.append(
                 f"kernel = {self.kernel!r}: must be a kernel such as smolux.kernels.Ballistic(); "
                 "wrap a function K(i, j) with smolux.kernels.from_function(K)"
             )
-        processes = _processes(self.processes)
+        processes = _several(self.processes, (Process, str))
         if all(isinstance(p, Process) for p in processes):
             processes = tuple(sorted(processes, key=lambda process: process.kind))
         object.__setattr__(self, "processes", processes)
@@ -71,6 +77,7 @@ class Model:
                 f"initial = {self.initial!r}: must be an initial condition such as "
                 "smolux.initial.monodisperse() or smolux.initial.from_sizes({1: 0.5, 2: 0.5})"
             )
+        problems += _attribute_problems(attributes, processes)
         if not problems:
             problems = _open_problems(processes, self.initial)
         if not problems:
@@ -97,7 +104,7 @@ class Model:
         number = share.scale if isinstance(share, Constant) else 0.0
         product = number * kernel if number > 0.0 else Shared(kernel, share)
         whole = tuple(replace(p, share=1.0) if p is pairs[0] else p for p in self.processes)
-        return Model(product, whole, self.initial)
+        return Model(product, whole, self.initial, self.attributes)
 
     @property
     def varying(self) -> tuple[str, ...]:
@@ -172,7 +179,30 @@ def _open_problems(processes: Sequence[Process], initial: Initial) -> list[str]:
     return problems
 
 
-def _processes(given: Any) -> tuple[Any, ...]:
-    """Return what was given as processes, one or several, right or wrong, as a tuple."""
-    single = isinstance(given, (Process, str)) or not isinstance(given, Iterable)
+def _attribute_problems(attributes: Sequence[Any], processes: Sequence[Any]) -> list[str]:
+    """Return what is wrong with what particles carry."""
+    problems = [
+        f"attribute {a!r}: must be an instance such as "
+        'smolux.attributes.Composition({"soot": 0.4, "sulphate": 0.6})'
+        for a in attributes
+        if not isinstance(a, Attribute)
+    ]
+    if len(attributes) > 1 and not problems:
+        problems.append("attributes: particles carry one composition: put all kinds into it")
+    sources = [p.called for p in processes if isinstance(p, Source)]
+    for composition in (a for a in attributes if isinstance(a, Composition)):
+        problems += [
+            Problem.at(
+                f"composition: sources: {name!r} is no source{did_you_mean(name, sources)}",
+                "attributes", "sources", name,
+            )
+            for name in composition.sources
+            if name not in sources
+        ]  # fmt: skip
+    return problems
+
+
+def _several(given: Any, one: tuple[type, ...]) -> tuple[Any, ...]:
+    """Return what was given, one or several, right or wrong, as a tuple."""
+    single = isinstance(given, one) or not isinstance(given, Iterable)
     return (given,) if single else tuple(given)

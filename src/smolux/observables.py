@@ -167,6 +167,46 @@ OBSERVABLES: tuple[Observable, ...] = (
         "of the same models: what left, as if the volume had always been that of now",
         clock=MASS_OUT, everywhere=False,
     ),
+    Observable(
+        "composition", (*_TIMES, "size", "component"),
+        "mean number of monomers of a kind in the particles of a size",
+        "of particles that carry a composition: the mean number of monomers of each kind in those "
+        "of a size, NaN where there are none; see [composition](../how-to/composition.md)",
+        everywhere=False,
+    ),
+    Observable(
+        "composition_variance", (*_TIMES, "size", "component"),
+        "variance of this number over the particles of a size",
+        "its variance over the particles of a size; divided by the square of the size that of the "
+        "fraction", everywhere=False,
+    ),
+    Observable(
+        "fraction_bin", (*_TIMES, "bin", "component"),
+        "mean fraction of a kind in the particles of a bin",
+        "the mean fraction of each kind in the particles of a bin", everywhere=False,
+    ),
+    Observable(
+        "fraction_bin_variance", (*_TIMES, "bin", "component"),
+        "variance of this fraction over the particles of a bin",
+        "its variance over these particles", everywhere=False,
+    ),
+    Observable(
+        "monomers", (*_TIMES, "component"), "number of monomers of a kind in the volume",
+        "monomers of each kind in the simulated volume, whole numbers", everywhere=False,
+    ),
+    Observable(
+        "mixing", _TIMES, "scatter of the composition by mass, over that of pure particles",
+        "degree of segregation: $\\sum_p m_p \\sum_c (f_{pc} - \\bar f_c)^2$ over its value for "
+        "pure particles; 1 if each particle is of one kind, 0 if all are alike", everywhere=False,
+    ),
+    Observable(
+        "monomers_in", (*_TIMES, "component"), "monomers of a kind that sources brought in",
+        "of open systems: as `mass_in`, for each kind", everywhere=False,
+    ),
+    Observable(
+        "monomers_out", (*_TIMES, "component"), "monomers of a kind that have left",
+        "of open systems: as `mass_out`, for each kind", everywhere=False,
+    ),
 )  # fmt: skip
 
 #: coordinates and what goes with them: the long name, and what it measures
@@ -187,6 +227,8 @@ COORDINATES: dict[str, tuple[str, Dimension]] = {
     "row_size": ("number of different sizes in a population", NONE),
     "sample_size": ("cluster size in monomers", NONE),
     "sample_count": ("number of simulated particles of that size", NONE),
+    "sample_composition": ("monomers of each kind in a particle", NONE),
+    "component": ("kind of monomers", NONE),
 }  # fmt: skip
 
 

@@ -241,6 +241,9 @@ class Tally(NamedTuple):
         Particles they stand for.
     sums : float64 array of shape (R, T, O)
         Sums of ``size**order`` over what stands for the sizes above L.
+    rows : float64 array of shape (R, T, K, C, 2)
+        What Python observes of the rows of particles, see `smolux.stochastic.carrying`; empty if
+        there are none.
     """
 
     scalars: np.ndarray
@@ -248,6 +251,7 @@ class Tally(NamedTuple):
     counts: np.ndarray
     bins: np.ndarray
     sums: np.ndarray
+    rows: np.ndarray
 
 
 class Grid(NamedTuple):
@@ -289,7 +293,9 @@ def new_state(rng: np.ndarray, processes: int, entries: int, unary: int) -> Stat
     )
 
 
-def new_tally(replicas: int, grid: Grid, sizes: int, processes: int) -> Tally:
+def new_tally(
+    replicas: int, grid: Grid, sizes: int, processes: int, rows: tuple[int, ...] = (0, 0, 2)
+) -> Tally:
     """Make room for observations; `scalars` is NaN where nothing is recorded yet."""
     shape = (replicas, len(grid.times))
     return Tally(
@@ -298,4 +304,5 @@ def new_tally(replicas: int, grid: Grid, sizes: int, processes: int) -> Tally:
         np.zeros((*shape, sizes + 1), np.int64),
         np.zeros((*shape, len(grid.edges))),
         np.zeros((*shape, len(grid.orders))),
+        np.zeros((*shape, *rows)),
     )

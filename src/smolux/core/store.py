@@ -16,6 +16,7 @@ from smolux.jit.compile import cold_piece, piece
 
 from .burst import Burst
 from .loop import Pieces
+from .rows import empty_pool, fill_from_source, leave, share_out
 from .state import BOTH, FIRST, ONE, PARTICLES, SECOND
 
 
@@ -48,6 +49,10 @@ class Store(NamedTuple):
     exchange : ``exchange(s, w)``, optional
         Put the only entry in the place of both of the pair; False, with nothing changed, if it does
         not go that way.
+    load : ``load(w, place)``, optional
+        Add the row of a particle to the pool, if particles have rows, see `smolux.core.rows`;
+        `take` and `double` move rows with their particles, and `put` gives each of the new ones
+        ``w.row``.
     """
 
     view: Callable[..., Any]
@@ -59,6 +64,7 @@ class Store(NamedTuple):
     double: Callable[..., Any]
     visit: Callable[..., Any]
     exchange: Callable[..., Any] | None = None
+    load: Callable[..., Any] | None = None
 
 
 @piece
@@ -135,6 +141,53 @@ def _make_update(
     return update
 
 
+@lru_cache(maxsize=64)
+def _make_carrying_update(
+    size: Callable[..., Any],
+    room: Callable[..., Any],
+    take: Callable[..., Any],
+    put: Callable[..., Any],
+    load: Callable[..., Any],
+) -> Callable[..., Any]:
+    @cold_piece
+    def update(s, w, gone, entries, p):
+        """As without rows; what those that vanish had is shared out to those that appear."""
+        if not room(s, w, gone, entries, p):
+            return False
+        a, b = s.count[FIRST], s.count[SECOND]
+        i = j = np.int64(0)
+        empty_pool(w)
+        if gone == BOTH:
+            i, j = size(s, w, a), size(s, w, b)
+            load(w, a)
+            load(w, b)
+            take(s, w, max(a, b))
+            take(s, w, min(a, b))
+            s.count[PARTICLES] -= 2
+        elif gone > 0:
+            place = a if gone == ONE else b
+            i = size(s, w, place)
+            load(w, place)
+            take(s, w, place)
+            s.count[PARTICLES] -= 1
+        total = i + j
+        if gone == 0 and entries > 0:
+            total = s.sizes[0]
+            fill_from_source(s, w, total)
+        for e in range(entries):
+            s.count[PARTICLES] += s.counts[e]
+            for _ in range(s.counts[e]):
+                share_out(s, w, s.sizes[e], total)
+                total -= s.sizes[e]
+                put(s, w, s.sizes[e], np.int64(1), i, j, p)
+                i = j = np.int64(0)
+        if total > 0:
+            leave(w, total)
+        return True
+
+    return update
+
+
 def pieces_of(
     store: Store, draw: Any, prepare: Any, burst: Burst | None = None, *, cold: bool = False
 ) -> Pieces:
@@ -142,14 +195,17 @@ def pieces_of(
 
     A `cold` update is not inlined into the loop: its calls are few beside what it does.
     """
-    update = _make_update(
-        store.size,
-        store.room,
-        store.take,
-        store.put,
-        store.exchange or _never,
-        cold_piece if cold else piece,
-    )
+    if store.load is not None:
+        update = _make_carrying_update(store.size, store.room, store.take, store.put, store.load)
+    else:
+        update = _make_update(
+            store.size,
+            store.room,
+            store.take,
+            store.put,
+            store.exchange or _never,
+            cold_piece if cold else piece,
+        )
     return Pieces(
         store.view,
         draw,

@@ -29,5 +29,10 @@ def state_of(state, r):
 def tally_of(tally, k):
     """Observations of replica `k`; of one replica, that at time `k`."""
     return Tally(
-        tally.scalars[k], tally.processes[k], tally.counts[k], tally.bins[k], tally.sums[k]
+        tally.scalars[k],
+        tally.processes[k],
+        tally.counts[k],
+        tally.bins[k],
+        tally.sums[k],
+        tally.rows[k],
     )

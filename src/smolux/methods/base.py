@@ -16,6 +16,8 @@ from smolux.kernels.majorant import Majorant
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Words = NDArray[np.uint64]
+#: sizes of particles, and what each carries, see `smolux.core.rows`
+Rows = tuple[Int, Int]
 
 
 @dataclass(frozen=True)
@@ -143,6 +145,26 @@ class Method:
 
     def bytes_per_replica(self, particles: int) -> int:
         """Estimate the memory of one replica at its start."""
+        raise NotImplementedError
+
+    def carrying(self) -> Method | None:
+        """Return this method for particles with rows, see `smolux.core.rows`; None if there is none.
+
+        It starts by `carrying_work`.
+        """
+        return None
+
+    def carrying_work(
+        self, rates: Rates, particles: list[Rows], born: Int, state: State, mass: int
+    ) -> Any:
+        """Store particles with their rows, of each replica, as `new_work` does without rows.
+
+        `born` is that of `smolux.core.rows`.
+        """
+        raise NotImplementedError
+
+    def rows(self, work: Any, state: State, replica: int) -> Rows:
+        """Return the particles of a replica with their rows."""
         raise NotImplementedError
 
 

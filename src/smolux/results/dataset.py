@@ -56,7 +56,18 @@ def _ragged(records: Records) -> dict[str, Any]:
         "row_size": ("instance", np.array([s.size for s in sizes], np.int64)),
         "sample_size": ("sample", np.concatenate(sizes + empty)),
         "sample_count": ("sample", np.concatenate(counts + empty)),
+        **_joint(records),
     }
+
+
+def _joint(records: Records) -> dict[str, Any]:
+    """Return what the particles of whole populations carry."""
+    if records.joint is None:
+        return {}
+    times, width = len(records.times), len(records.components)
+    none = np.empty((0, width), np.int64)
+    rows = [r[t] if t < len(r) else none for r in records.joint for t in range(times)]
+    return {"sample_composition": (("sample", "component"), np.concatenate([*rows, none]))}
 
 
 def _values(records: Records, lengths: Mapping[str, int]) -> dict[str, Any]:
@@ -102,6 +113,7 @@ def to_dataset(model: Model, records: Records) -> xr.Dataset:
         "size": np.arange(1, np.shape(records.values["n"])[2] + 1),
         "process": np.asarray(records.processes, dtype=np.str_),
         **_bins(records.bin_edges),
+        **({"component": np.asarray(records.components)} if records.components else {}),
         **{k: ragged.pop(k) for k in ("instance_replica", "instance_time") if k in ragged},
     }
     values = _values(records, {k: len(v) for k, v in coordinates.items()})
@@ -110,7 +122,7 @@ def to_dataset(model: Model, records: Records) -> xr.Dataset:
     long_names |= {o.name: o.long_name for o in observables.OBSERVABLES}
     for name in map(str, ds.variables):
         ds[name].attrs["long_name"] = long_names[name]
-        if name not in ("process", "replica", "instance_replica"):
+        if name not in ("process", "replica", "instance_replica", "component"):
             ds[name].attrs["units"] = units.get(name, "1")
     if "row_size" in ds:
         ds["row_size"].attrs["sample_dimension"] = "sample"

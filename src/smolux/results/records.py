@@ -30,6 +30,10 @@ class Records:
         not known are left out.
     distribution : list of list of (sizes, counts), optional
         The whole population of each replica at each time.
+    joint : list of list of ndarray, optional
+        How many monomers of each kind the particles of these populations have.
+    components : tuple of str
+        The kinds of monomers, if particles carry a composition.
     """
 
     times: Float
@@ -38,6 +42,8 @@ class Records:
     bin_edges: Float
     values: dict[str, Float]
     distribution: list[list[tuple[Int, Int]]] | None = None
+    joint: list[list[Int]] | None = None
+    components: tuple[str, ...] = ()
     #: further attributes of the result: method, seed, wall time, ...
     attributes: dict[str, Any] = field(default_factory=dict)
     #: warnings and fallbacks, in the order they came

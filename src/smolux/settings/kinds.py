@@ -119,8 +119,12 @@ class Registered(Kind):
     def __init__(self, module: str, registry: str, names: str, base: str) -> None:
         self.module, self.registry, self.names, self.base = module, registry, names, base
 
+    def entries(self) -> tuple[Any, ...]:
+        """Return the entries of the registry."""
+        return tuple(getattr(import_module(self.module), self.registry))
+
     def _entries(self) -> dict[str, Any]:
-        return {e.name: e for e in getattr(import_module(self.module), self.registry)}
+        return {e.name: e for e in self.entries()}
 
     @property
     def words(self) -> list[str]:

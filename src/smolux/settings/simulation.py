@@ -15,6 +15,7 @@ from .target_error import FEWEST, StoppingRule, named
 
 if TYPE_CHECKING:
     from smolux.methods.base import Method
+    from smolux.model import Model
     from smolux.weighting.base import Weighting
 
 #: the replicas from this number on are pilots, see `smolux.settings.target_error`
@@ -95,12 +96,37 @@ class Settings(Arguments):
             problems += _too_few(good["replicas"], good.get("max_replicas"))
         return problems
 
+    @classmethod
+    def against(cls, model: Model, given: Mapping[str, Any]) -> list[str]:
+        return _not_carried(given) if model.attributes else []
+
     @property
     def rule(self) -> StoppingRule | None:
         """What replicas are added for, if they are."""
         if self.target_error is None:
             return None
         return StoppingRule(self.target, self.target_error, self.replicas, self.max_replicas)
+
+
+def _not_carried(given: Mapping[str, Any]) -> list[str]:
+    """Say what does not go with particles that carry something."""
+    problems: list[str] = []
+    method = given.get("method", "auto")
+    kinds = {m.name: m() for m in METHOD.entries()}
+    carrying = [name for name, m in kinds.items() if m.carrying() is not None]
+    if isinstance(method, str):
+        method = kinds.get(method)
+    if method is not None and getattr(method, "carrying", lambda: True)() is None:
+        cure = f"its particles carry no composition; take {' or '.join(carrying)}"
+        problems.append(Problem("method", cure, method.name))
+    weighting = given.get("weighting", "number")
+    if getattr(weighting, "name", weighting) != "number":
+        cure = "a simulated particle stands for one, with its composition: take 'number'"
+        problems.append(Problem("weighting", cure, getattr(weighting, "name", weighting)))
+    if given.get("subvolumes", 1) != 1:
+        cure = "compositions are not mixed among sub-volumes: take 1, and replicas instead"
+        problems.append(Problem("subvolumes", cure, given["subvolumes"]))
+    return problems
 
 
 def _too_few(first: int, most: int | None) -> list[str]:

@@ -83,6 +83,9 @@ def _put(
     arrays[f"{key}/distribution/rows"] = np.array([len(s) for s, _ in rows], np.int64)
     arrays[f"{key}/distribution/sizes"] = np.concatenate([s for s, _ in rows] + empty)
     arrays[f"{key}/distribution/counts"] = np.concatenate([c for _, c in rows] + empty)
+    joint = [each for replica in getattr(group, "joint", ()) for each in replica]
+    if joint:
+        arrays[f"{key}/distribution/joint"] = np.concatenate(joint)
     about = {
         "first": group.first,
         "seconds": group.seconds,
@@ -156,10 +159,12 @@ def _take(
     stored = part("distribution")
     ends = np.cumsum(stored["rows"])[:-1]
     rows = list(zip(np.split(stored["sizes"], ends), np.split(stored["counts"], ends), strict=True))
-    distribution = []
+    given = np.split(stored["joint"], ends) if "joint" in stored else []
+    distribution, joint = [], []
     for length in about["populations"]:
         distribution.append(rows[:length])
-        rows = rows[length:]
+        joint.append(given[:length])
+        rows, given = rows[length:], given[length:]
     common: dict[str, Any] = {
         "first": about["first"],
         "state": State(**part("state")),
@@ -167,11 +172,12 @@ def _take(
         "codes": arrays[f"{key}/codes"],
         "windows": TimeWindows(**part("windows")),
         "distribution": distribution,
+        "joint": joint,
         "seconds": about["seconds"],
         "bounds_seconds": about.get("bounds_seconds", 0.0),
     }
     if "parts" not in about:
-        return Group(plan, work=plan.method.work_type(**part("work")), **common)
+        return Group(plan, work=plan.store.work_type(**part("work")), **common)
     times = tuple(about.get("open", ()))
     alone = within(plan, times) if times else replace(plan, subvolumes=1, replicas=1)
     parts: list[Any] = [

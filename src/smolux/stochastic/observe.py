@@ -14,6 +14,7 @@ from smolux.core.state import AT, DOUBLINGS, HIGHEST
 from smolux.results.records import Records
 from smolux.settings.target_error import Target
 
+from .carrying import composition_of
 from .plan import Plan
 from .replicas import Group
 from .subvolumes import SubvolumeReplica
@@ -102,6 +103,33 @@ class Seen:
         """Return the mass in the simulated volume, for which the grid has the last sum."""
         return np.where(self.missing, np.nan, self.stood @ self.sizes + self.sums[..., -1])
 
+    @cached_property
+    def rows(self) -> Float:
+        """What was observed of the rows, see `smolux.stochastic.carrying.observe_rows`."""
+        found = self._tallied("rows")
+        found[self.missing] = np.nan
+        return found
+
+    def carried(self, sized: bool) -> tuple[Float, Float]:
+        """Return mean and variance over the particles of each size, or of each bin."""
+        first = self.plan.sizes
+        counts = self._tallied("counts")[:, :, 1:] if sized else self.bins[:, :, : self.used]
+        part = slice(0, first) if sized else slice(first, first + self.used)
+        sums = self.rows[:, :, part]
+        with np.errstate(all="ignore"):
+            mean = sums[..., 0] / np.where(counts > 0, counts, np.nan)[..., None]
+            square = sums[..., 1] / np.where(counts > 0, counts, np.nan)[..., None]
+        return mean, np.maximum(square - mean**2, 0.0)
+
+    def mixing(self) -> Float:
+        """Return the scatter of the composition by mass, over that of pure particles."""
+        x, square = self.rows[..., -2, :, 0], self.rows[..., -2, :, 1]
+        with np.errstate(all="ignore"):
+            mass = x.sum(axis=-1)
+            pure = mass - (x**2).sum(axis=-1) / mass
+            found = (square - x**2 / mass[..., None]).sum(axis=-1) / pure
+        return np.where(pure > 0.0, found, np.nan)
+
 
 #: observables that are no column of the state
 COMPUTED: dict[str, Callable[[Seen], Float]] = {
@@ -112,9 +140,23 @@ COMPUTED: dict[str, Callable[[Seen], Float]] = {
     "n_bin": lambda seen: seen.bins[:, :, : seen.used] / seen.volume[..., None],
     "attempts": lambda seen: seen.attempts,
     "mass": Seen.mass,
+    "composition": lambda seen: seen.carried(sized=True)[0],
+    "composition_variance": lambda seen: seen.carried(sized=True)[1],
+    "fraction_bin": lambda seen: seen.carried(sized=False)[0],
+    "fraction_bin_variance": lambda seen: seen.carried(sized=False)[1],
+    "monomers": lambda seen: seen.rows[..., -2, :, 0],
+    "mixing": Seen.mixing,
+    "monomers_in": lambda seen: seen.rows[..., -1, :, 0],
+    "monomers_out": lambda seen: seen.rows[..., -1, :, 1],
 }
 #: observables of systems that are open alone
 _OPEN = ("mass", "mass_in", "mass_out")
+#: those of particles that carry a composition, and of open systems of these
+_CARRIED = (
+    "composition", "composition_variance", "fraction_bin", "fraction_bin_variance", "monomers",
+    "mixing",
+)  # fmt: skip
+_CARRIED_OPEN = ("monomers_in", "monomers_out")
 
 
 def to_records(plan: Plan, groups: Sequence[Group | SubvolumeReplica]) -> Records:
@@ -128,7 +170,9 @@ def to_records(plan: Plan, groups: Sequence[Group | SubvolumeReplica]) -> Record
     """
     seen, values = Seen(plan, groups), {}
     for o in observables.OBSERVABLES:
-        if o.name in _OPEN and not plan.model.open:
+        if o.name in (*_OPEN, *_CARRIED_OPEN) and not plan.model.open:
+            continue
+        if o.name in (*_CARRIED, *_CARRIED_OPEN) and not plan.model.attributes:
             continue
         if o.name in COMPUTED:
             values[o.name] = COMPUTED[o.name](seen)
@@ -146,6 +190,10 @@ def to_records(plan: Plan, groups: Sequence[Group | SubvolumeReplica]) -> Record
         distribution=[rows for g in groups for rows in g.distribution]
         if plan.distribution
         else None,
+        joint=[rows for g in groups for rows in getattr(g, "joint", [])]
+        if plan.distribution and plan.model.attributes
+        else None,
+        components=composition_of(plan).kinds if plan.model.attributes else (),
         attributes=_attributes(plan, groups),
         warnings=Totals.of(groups, seen.attempts).warnings(plan),
     )

@@ -98,9 +98,14 @@ class Plan(Settings):
         return TimeWindows(*(np.array(column) for column in self._windows))
 
     @cached_property
+    def store(self) -> Method:
+        """The method as particles are stored: with rows, if they carry anything."""
+        return (self.method.carrying() or self.method) if self.model.attributes else self.method
+
+    @cached_property
     def loop(self) -> Any:
         """The compiled loop."""
-        return loop_for(self.physics, self.method, self.weighting)
+        return loop_for(self.physics, self.store, self.weighting)
 
     @property
     def volume(self) -> float:
@@ -169,7 +174,7 @@ def check_memory(plan: Plan, done: int = 0) -> None:
     observations = plan.replicas * len(plan.times) * row
     # sub-volumes are filled anew: what goes from one to the other is there besides
     mixing = 8 * plan.particles if plan.subvolumes > 1 else 0
-    stores = (plan.replicas - done) * plan.method.bytes_per_replica(plan.particles) + mixing
+    stores = (plan.replicas - done) * plan.store.bytes_per_replica(plan.particles) + mixing
     if observations + stores > 0.9 * available:
         raise InputError(
             f"the run needs about {(observations + stores) / 1e9:.1f} GB ({stores / 1e9:.1f} GB of "

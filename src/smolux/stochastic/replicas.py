@@ -26,6 +26,7 @@ from smolux.core.state import (
     EXCESS,
     EXTINCT,
     GROW,
+    NEXT,
     PARTICLES,
     PAUSE,
     PAUSED,
@@ -59,6 +60,7 @@ from smolux.processes.base import PairProcess, UnaryProcess, text_of
 from smolux.runtime import room
 
 from .assembly import uncompilable
+from .carrying import carrying_work, joint_population, observe_rows, tally_shape
 from .parameters import bound_splits, factor_parameters
 from .plan import Plan
 from .remembered import spent
@@ -81,6 +83,8 @@ class Group:
     codes: Int
     windows: TimeWindows
     distribution: list[list[tuple[Int, Int]]] = field(default_factory=list)
+    #: what the particles of these populations carry, row by row, if they carry anything
+    joint: list[list[Int]] = field(default_factory=list)
     seconds: float = 0.0
     compile_seconds: float = 0.0
     #: for bounds and tables of rates, not part of `seconds`
@@ -101,7 +105,10 @@ class Group:
         before = spent()
         populations = initial_populations(plan, range(first, first + count))
         state = empty_state(plan, streams(plan.seed, first, count))
-        work = plan.method.new_work(plan.rates, populations, state, plan.mass)
+        if plan.model.attributes:
+            work = carrying_work(plan, populations, first, state)
+        else:
+            work = plan.store.new_work(plan.rates, populations, state, plan.mass)
         new = cls.of(plan, first, state, work, plan.windows(), loop)
         new.bounds_seconds = spent() - before
         return new
@@ -120,16 +127,17 @@ class Group:
         """Start with these particles; see `start`. The `parameters` are those of a group before."""
         count, processes = len(state.rng), plan.model.processes
         state.count[:, DOUBLE_AT] = plan.doubles_at
-        state.count[:, PAUSE] = plan.distribution
+        state.count[:, PAUSE] = plan.distribution or bool(plan.model.attributes)
         return cls(
             plan,
             first,
             state,
             work,
-            new_tally(count, plan.grid, plan.sizes, len(processes)),
+            new_tally(count, plan.grid, plan.sizes, len(processes), tally_shape(plan)),
             np.full(count, BUDGET, np.int64),
             windows,
             distribution=[[] for _ in range(count if plan.distribution else 0)],
+            joint=[[] for _ in range(count if plan.distribution else 0)],
             loop=loop,
             parameters=parameters,
         )
@@ -248,11 +256,11 @@ class Group:
             # sizes and counts, and as much to sort them; a store may hold less, if it counts
             size = min(32 * int(self.state.count[r, PARTICLES]), 4 * size_of(self.work))
             with room.needed(size, f"the clusters of replica {self.first + r}, to be kept,"):
-                self.distribution[r].append(plan.method.population(self.work, self.state, r))
+                self._keep(r)
         # whatever comes of it, it is asked for anew; but not a population, or it would come twice
         self.codes[r] = BUDGET
         if code == BOUND:
-            plan.method.supply_bound(self.work, plan.rates, self.state, r)
+            plan.store.supply_bound(self.work, plan.rates, self.state, r)
         elif code == SPLITS:
             assert self.parameters is not None
             bound_splits(plan.model.processes, self.parameters, int(self.state.count[r, WANTED]))
@@ -272,9 +280,23 @@ class Group:
                 f"t = {self.state.clock[r, TIME]:.6g}: end earlier"
             )
 
+    def _keep(self, r: int) -> None:
+        """Take what Python observes of a replica that has come to an output time."""
+        plan = self.plan
+        if not plan.model.attributes:
+            self.distribution[r].append(plan.store.population(self.work, self.state, r))
+            return
+        sizes, rows = plan.store.rows(self.work, self.state, r)
+        k = int(self.state.count[r, NEXT]) - 1
+        observe_rows(plan, sizes, rows, self.work.account[r], self.tally.rows[r, k])
+        if plan.distribution:
+            sizes, counts, carried = joint_population(sizes, rows)
+            self.distribution[r].append((sizes, counts))
+            self.joint[r].append(carried)
+
     def _grow(self) -> None:
         """Make the store larger, if there is memory for that."""
-        method, before = self.plan.method, size_of(self.work)
+        method, before = self.plan.store, size_of(self.work)
         last = self.first + len(self.codes) - 1
         which = f"replicas {self.first} to {last}" if last > self.first else f"replica {last}"
         time_ = self.state.clock[self.codes == GROW, TIME].max()

@@ -122,6 +122,11 @@ class AcceptanceRejection(Method):
     def bytes_per_replica(self, particles: int) -> int:
         return 8 * particles
 
+    def carrying(self) -> Method:
+        from .carrying import Carrying
+
+        return Carrying()
+
 
 def _bounds(work: Work, rates: Rates, one: Sequence[Any], other: Sequence[Any]) -> Float:
     """Bound the rates of sizes in some levels with those in others; NaN where there is no bound."""

@@ -86,7 +86,9 @@ def _ask(w, monomers, slot):
     prefetch(w.sizes, max(slot - monomers, 0))
 
 
-def _make_find(rate: Any) -> Any:
+def make_find(rate: Any) -> Any:
+    """Bind the search for the next pair, see `smolux.core.burst.Burst`."""
+
     @piece
     def value_of(w, i, j, p):
         n = w.table.shape[0]
@@ -133,7 +135,8 @@ def _make_find(rate: Any) -> Any:
     return find
 
 
-def _make_draw(find: Any) -> Any:
+def make_draw(find: Any) -> Any:
+    """Bind the drawing of a pair, see `smolux.core.loop.Pieces`."""
     draw_one = make_draw_one(find)
 
     @piece
@@ -198,7 +201,7 @@ def _exchange_one(w, monomers, stored, slot, size, count):
 def _row(s, w):
     if w.ahead[0] < 0.0 or s.clock[MAJORANT] <= 0.0:
         return 0
-    # each event brings the next look at all sizes nearer by two at most, see `_prepare`
+    # each event brings the next look at all sizes nearer by two at most, see `prepare`
     return (s.count[PARTICLES] + 64 - s.count[SINCE]) // 2
 
 
@@ -280,7 +283,8 @@ def _put(s, w, size, count, i, j, p):
 
 
 @piece
-def _prepare(s, w, p):
+def prepare(s, w, p):
+    """Bring the bound in force up to date."""
     if w.apart[VAIN] == 1:
         seek_apart(s, w)
     if s.count[SINCE] > s.count[PARTICLES] + 64:
@@ -304,7 +308,9 @@ def _double(s, w):
 
 
 @lru_cache(maxsize=64)
-def _make_visit(tally: Any) -> Any:
+def make_visit(tally: Any) -> Any:
+    """Bind the counting of all particles."""
+
     @cold_piece
     def visit(s, w, t, grid, p):
         largest = np.int64(0)
@@ -321,10 +327,8 @@ def _make_visit(tally: Any) -> Any:
 
 def bind(rate: Any, tally: Any) -> Pieces:
     """Bind the pieces to a rate and a way to count."""
-    find = _make_find(rate)
+    find = make_find(rate)
     store = Store(
-        view, _size, _pick, _room, _take, _put, _double, _make_visit(tally), _exchange_pair
+        view, _size, _pick, _room, _take, _put, _double, make_visit(tally), _exchange_pair
     )
-    return pieces_of(
-        store, _make_draw(find), _prepare, Burst(_row, _hold, find, _replace, _release)
-    )
+    return pieces_of(store, make_draw(find), prepare, Burst(_row, _hold, find, _replace, _release))

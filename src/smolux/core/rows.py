@@ -1,0 +1,83 @@
+"""Rows that travel with particles: how many of the monomers of each are of which kind.
+
+Of C kinds a row has the first C - 1; the rest of the size is of the last kind. The work arrays of a
+method that carries rows have, beside its own,
+
+- ``row``: of the particle that is being put in;
+- ``pool``: what those had that were taken out, and no other has yet;
+- ``account``: what came in and what left, of each kind, and of all in the last column;
+- ``born``: for each process what of `POOL` monomers that it brings in is of which kind.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from smolux.jit.compile import entry, piece
+
+from .hypergeometric import hypergeometric
+from .state import PROCESS
+
+#: as many monomers as sources are taken to draw from: drawing with and without return is the same
+POOL = 1 << 50
+CAME, LEFT = 0, 1
+
+
+@piece
+def empty_pool(w):
+    """Begin with nothing."""
+    for d in range(w.pool.shape[0]):
+        w.pool[d] = 0
+
+
+@piece
+def fill_from_source(s, w, size):
+    """Draw what a particle has that comes in."""
+    born = w.born[s.count[PROCESS]]
+    rest, left = np.int64(POOL), size
+    for d in range(w.pool.shape[0]):
+        w.pool[d] = hypergeometric(s.rng, rest, born[d], left)
+        w.account[CAME, d] += w.pool[d]
+        rest -= born[d]
+        left -= w.pool[d]
+    w.account[CAME, w.pool.shape[0]] += size
+
+
+@piece
+def share_out(s, w, size, total):
+    """Write a fair share of the pool, in which there are `total` monomers, into the row."""
+    if size == total:
+        for d in range(w.pool.shape[0]):
+            w.row[d], w.pool[d] = w.pool[d], 0
+        return
+    rest, left = total, size
+    for d in range(w.pool.shape[0]):
+        found = hypergeometric(s.rng, rest, w.pool[d], left)
+        rest -= w.pool[d]
+        left -= found
+        w.row[d] = found
+        w.pool[d] -= found
+
+
+@piece
+def leave(w, total):
+    """Count what is left in the pool as gone."""
+    for d in range(w.pool.shape[0]):
+        w.account[LEFT, d] += w.pool[d]
+    w.account[LEFT, w.pool.shape[0]] += total
+
+
+def _deal(words, sizes, rows, pool, total):
+    for k in range(sizes.shape[0]):
+        rest, left = total, sizes[k]
+        for d in range(pool.shape[0]):
+            found = hypergeometric(words, rest, pool[d], left)
+            rest -= pool[d]
+            left -= found
+            rows[k, d] = found
+            pool[d] -= found
+        total -= sizes[k]
+
+
+#: ``deal(words, sizes, rows, pool, total)``: give each of some particles its share of a pool
+deal = entry(_deal)

@@ -1,0 +1,175 @@
+"""Acceptance-rejection with rows: every particle is stored, with what it carries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from smolux.core import rng
+from smolux.core.bounds import note_largest
+from smolux.core.loop import Pieces
+from smolux.core.slots import slot_of
+from smolux.core.state import LARGEST, MONOMERS, SMALLEST, STORED, TRIALS, UNARY_BITS, State
+from smolux.core.store import Store, pieces_of
+from smolux.core.together import largest_rate, takes
+from smolux.jit.compile import cold_piece, piece
+from smolux.methods.base import Int, Rates, Rows, enlarged
+
+from . import pieces
+from .method import AcceptanceRejection
+from .store import APART, SLACK, renew_all, size_of, watch
+
+
+class Work(NamedTuple):
+    """As `smolux.methods.acceptance_rejection.store.Work`, without monomers that are only counted.
+
+    Attributes
+    ----------
+    rows : int64 array of shape (R, capacity, D)
+        What each particle carries, and the others of `smolux.core.rows`.
+    """
+
+    sizes: np.ndarray
+    ahead: np.ndarray
+    level: np.ndarray
+    apart: np.ndarray
+    edges: np.ndarray
+    majorant: np.ndarray
+    table: np.ndarray
+    rows: np.ndarray
+    row: np.ndarray
+    pool: np.ndarray
+    account: np.ndarray
+    born: np.ndarray
+
+
+@piece
+def _view(w, r):
+    return Work(
+        w.sizes[r], w.ahead[r], w.level[r], w.apart[r], w.edges, w.majorant, w.table,
+        w.rows[r], w.row[r], w.pool[r], w.account[r], w.born,
+    )  # fmt: skip
+
+
+@piece
+def _size(s, w, place):
+    return size_of(w, np.int64(0), place)
+
+
+@piece
+def _pick(s, w, r, c):
+    # all are held together
+    largest = largest_rate(s, r, np.int64(1), slot_of(s.count[LARGEST], UNARY_BITS))
+    while True:
+        k = rng.below(s.rng, s.count[STORED])
+        size = np.int64(w.sizes[k])
+        if takes(s, r, size, largest):
+            return k, size
+        s.count[TRIALS] += 1
+
+
+@piece
+def _room(s, w, gone, entries, p):
+    needed = np.int64(SLACK)
+    for e in range(entries):
+        needed += s.counts[e]
+    if s.count[STORED] + needed > w.sizes.shape[0]:
+        return False
+    if w.apart[APART] == 1:
+        watch(s, w, gone, entries)
+    for e in range(entries):
+        s.count[SMALLEST] = min(s.count[SMALLEST], s.sizes[e])
+        note_largest(s, s.sizes[e])
+    return True
+
+
+@piece
+def _load(w, place):
+    for d in range(w.pool.shape[0]):
+        w.pool[d] += w.rows[place, d]
+
+
+@piece
+def _take(s, w, place):
+    last = s.count[STORED] - 1
+    w.sizes[place] = w.sizes[last]
+    for d in range(w.pool.shape[0]):
+        w.rows[place, d] = w.rows[last, d]
+    s.count[STORED] = last
+
+
+@piece
+def _put(s, w, size, count, i, j, p):
+    place = s.count[STORED]
+    w.sizes[place] = size
+    for d in range(w.pool.shape[0]):
+        w.rows[place, d] = w.row[d]
+    s.count[STORED] = place + 1
+
+
+@cold_piece
+def _double(s, w):
+    stored = s.count[STORED]
+    if 2 * stored + SLACK > w.sizes.shape[0]:
+        return False
+    if w.apart[APART] == 1:  # of the one apart there are two now
+        renew_all(w)
+    for k in range(stored):
+        w.sizes[stored + k] = w.sizes[k]
+        for d in range(w.pool.shape[0]):
+            w.rows[stored + k, d] = w.rows[k, d]
+    for k in range(2):
+        for d in range(w.account.shape[1]):
+            w.account[k, d] *= 2
+    s.count[STORED] *= 2
+    return True
+
+
+@dataclass(frozen=True)
+class Carrying(AcceptanceRejection):
+    """Acceptance-rejection of particles with rows, see `smolux.core.rows`."""
+
+    work_type: ClassVar[type] = Work
+
+    @staticmethod
+    def bind(rate: Any, tally: Any) -> Pieces:
+        store = Store(
+            _view, _size, _pick, _room, _take, _put, _double, pieces.make_visit(tally), load=_load
+        )
+        return pieces_of(store, pieces.make_draw(pieces.make_find(rate)), pieces.prepare)
+
+    def carrying_work(
+        self, rates: Rates, particles: list[Rows], born: Int, state: State, mass: int
+    ) -> Work:
+        populations = [np.unique(sizes, return_counts=True) for sizes, _ in particles]
+        plain = self.new_work(rates, populations, state, mass)
+        stored = np.array([len(sizes) for sizes, _ in particles])
+        replicas, width = len(particles), born.shape[1]
+        sizes = np.zeros((replicas, int(stored.max()) + 8), np.int64)
+        rows = np.zeros((*sizes.shape, width), np.int64)
+        for r, (given, carried) in enumerate(particles):
+            sizes[r, : len(given)], rows[r, : len(given)] = given, carried
+        state.count[:, MONOMERS], state.count[:, STORED] = 0, stored
+        return Work(
+            **plain._replace(sizes=sizes)._asdict(),
+            rows=rows,
+            row=np.zeros((replicas, width), np.int64),
+            pool=np.zeros((replicas, width), np.int64),
+            account=np.zeros((replicas, 2, width + 1), np.int64),
+            born=born,
+        )
+
+    def grow(self, work: Any, state: State) -> Any:
+        more = 2 * work.sizes.shape[1]
+        rows = np.zeros((len(work.rows), more, work.rows.shape[2]), np.int64)
+        rows[:, : work.rows.shape[1]] = work.rows
+        return work._replace(sizes=enlarged(work.sizes, more), rows=rows)
+
+    def rows(self, work: Any, state: State, replica: int) -> Rows:
+        stored = int(state.count[replica, STORED])
+        return work.sizes[replica, :stored], work.rows[replica, :stored]
+
+    def bytes_per_replica(self, particles: int) -> int:
+        return 8 * particles
