@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from . import kernels
+from .attributes import ATTRIBUTES, Attribute
 from .errors import InputError, Problem, about, did_you_mean
 from .functions.law import Law
 from .functions.stated import Stated
@@ -56,8 +57,8 @@ def _plain(value: Any) -> Any:
     return _function(Function(getattr(value, "py_func", value), (), ()))
 
 
-def _fields(thing: Process | Initial) -> dict[str, Any]:
-    found = {f.name: _plain(getattr(thing, f.name)) for f in fields(thing)}
+def _fields(thing: Process | Initial | Attribute) -> dict[str, Any]:
+    found = {f.name: _plain(getattr(thing, f.name)) for f in fields(thing)}  # type: ignore[arg-type]
     return {name: value for name, value in found.items() if (name, value) != ("label", None)}
 
 
@@ -77,7 +78,9 @@ def _initial_to_dict(initial: Initial) -> dict[str, Any]:
 
 
 def model_to_dict(model: Model) -> dict[str, Any]:
-    """Write a model as plain data: tables ``kernel`` and ``initial`` and a list ``processes``.
+    """Write a model as plain data: tables ``kernel`` and ``initial``, and a list ``processes``.
+
+    And a list ``attributes``, if particles carry any.
 
     Parameters
     ----------
@@ -89,10 +92,12 @@ def model_to_dict(model: Model) -> dict[str, Any]:
         Of texts, numbers, lists and dictionaries only, as JSON holds them. Laws, formulas and
         numbers are rebuilt by `model_from_dict`; of a Python function only the text is kept.
     """
+    carried = [{"name": a.name, **_fields(a)} for a in model.attributes]
     return {
         "kernel": _kernel_to_dict(model.kernel),
         "processes": [{"name": p.name, **_fields(p)} for p in model.processes],
         "initial": _initial_to_dict(model.initial),
+        **({"attributes": carried} if carried else {}),
     }
 
 
@@ -174,6 +179,14 @@ class _Reader:
             return None
         return self.build(("processes", number), f"process {name!r}", kinds[name], rest)
 
+    def attribute(self, number: int, given: Any) -> Attribute | None:
+        """Rebuild the attribute of this number."""
+        kinds = {a.name: a for a in ATTRIBUTES}
+        name, rest = self.table("attribute", given, list(kinds))
+        if not name:
+            return None
+        return self.build(("attributes", number), f"attribute {name!r}", kinds[name], rest)
+
     def initial(self, given: Any) -> Initial | None:
         """Rebuild an initial condition."""
         kinds = {i.name: i for i in INITIALS}
@@ -203,8 +216,8 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
     Parameters
     ----------
     data : mapping
-        With the keys ``kernel``, ``processes`` and ``initial``; the last two may be left out, as in
-        `smolux.Model`.
+        With the keys ``kernel``, ``processes``, ``initial`` and ``attributes``; all but the first
+        may be left out, as in `smolux.Model`.
 
     Returns
     -------
@@ -218,7 +231,7 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
     """
     if not isinstance(data, Mapping):
         raise InputError(f"model = {data!r}: must be a dictionary with the key 'kernel'")
-    known = ("kernel", "processes", "initial")
+    known = ("kernel", "processes", "initial", "attributes")
     reader = _Reader()
     reader.problems += [
         f"model: there is no key {k!r}{did_you_mean(str(k), known)}" for k in data if k not in known
@@ -228,12 +241,12 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
         parts["kernel"] = reader.kernel(data["kernel"])
     else:
         reader.problems.append("model: the key 'kernel' is missing")
-    if "processes" in data:
-        given = data["processes"]
-        if isinstance(given, Sequence) and not isinstance(given, str):
-            parts["processes"] = tuple(reader.process(n, p) for n, p in enumerate(given))
-        else:
-            reader.problems.append(f"processes = {given!r}: must be a list of tables")
+    for key, rebuild in (("processes", reader.process), ("attributes", reader.attribute)):
+        given = data.get(key, ())
+        if not isinstance(given, Sequence) or isinstance(given, str):
+            reader.problems.append(f"{key} = {given!r}: must be a list of tables")
+        elif key in data:
+            parts[key] = tuple(rebuild(n, each) for n, each in enumerate(given))
     if "initial" in data:
         parts["initial"] = reader.initial(data["initial"])
     if reader.problems:

@@ -148,7 +148,7 @@ class Method:
         raise NotImplementedError
 
     def carrying(self) -> Method | None:
-        """Return this method for particles with rows, see `smolux.core.rows`; None if there is none.
+        """Return this method for particles with rows, see `smolux.core.rows`; None if none is.
 
         It starts by `carrying_work`.
         """
