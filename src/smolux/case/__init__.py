@@ -37,7 +37,17 @@ from .write import to_toml
 
 __all__ = ["Case", "Output", "Parallel", "Run", "Solve", "load", "parse", "read_value"]
 
-_TABLES = ("kernel", "processes", "initial", "run", "solve", "parallel", "output", "spatial")
+_TABLES = (
+    "kernel",
+    "processes",
+    "initial",
+    "attributes",
+    "run",
+    "solve",
+    "parallel",
+    "output",
+    "spatial",
+)
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,14 @@
-"""The tables that say what happens: ``[kernel]``, ``[[processes]]``, ``[initial]``."""
+"""The tables of the model: ``[kernel]``, ``[[processes]]``, ``[initial]``, ``[[attributes]]``."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
 from typing import Any
 
 from smolux import units
+from smolux.attributes import ATTRIBUTES
 from smolux.errors import InputError, did_you_mean
 from smolux.initial import INITIALS, Empty, Initial, Sizes
 from smolux.kernels import KERNELS, Sum
@@ -68,6 +69,8 @@ def read_physics(case: Mapping[str, Any], problems: Problems) -> Physics:
         data["processes"] = _processes(case["processes"], problems)
     if "initial" in case:
         data["initial"] = _initial(Table(case["initial"], ("initial",), problems))
+    if "attributes" in case:
+        data["attributes"] = _attributes(case["attributes"], problems)
     return Physics(data, origin)
 
 
@@ -228,28 +231,50 @@ def _formula(table: Table) -> dict[str, Any]:
 # --- processes and initial condition -----------------------------------------------------------
 
 
-def _processes(content: Any, problems: Problems) -> list[dict[str, Any]]:
+def _listed(
+    key: str, content: Any, kinds: Sequence[Any], problems: Problems
+) -> Iterator[tuple[Table, Any]]:
+    """Yield the tables of a list with the kind that the name of each stands for."""
     if isinstance(content, Mapping):
-        problems.add(("processes",), "write [[processes]] with two brackets, once for each process")
-        return []
+        problems.add((key,), f"write [[{key}]] with two brackets, once for each")
+        return
     if not isinstance(content, list):
-        problems.add(("processes",), f"processes = {show(content)}: must be tables [[processes]]")
-        return []
-    kinds = {p.name: p for p in PROCESSES}
-    found = []
+        problems.add((key,), f"{key} = {show(content)}: must be tables [[{key}]]")
+        return
+    known = {kind.name: kind for kind in kinds}
     for n, entry in enumerate(content):
-        table = Table(entry, ("processes", n), problems)
+        table = Table(entry, (key, n), problems)
         if "name" not in table:
             if isinstance(entry, Mapping):
-                table.require("name", did_you_mean("", list(kinds))[2:])
+                table.require("name", did_you_mean("", list(known))[2:])
             continue
-        name = table.choice("name", None, list(kinds))
-        if name is None:
-            continue
-        data = {"name": name}
-        for f in fields(kinds[name]):
+        name = table.choice("name", None, list(known))
+        if name is not None:
+            yield table, known[name]
+
+
+def _attributes(content: Any, problems: Problems) -> list[dict[str, Any]]:
+    found = []
+    for table, kind in _listed("attributes", content, ATTRIBUTES, problems):
+        data = {"name": kind.name}
+        for f in fields(kind):
             value = table.take(f.name)
-            words = _of_process(kinds[name], f.name)
+            if isinstance(value, Mapping):
+                data[f.name] = value
+            elif value is not None or (f.default is MISSING and f.default_factory is MISSING):
+                table.bad(f.name, "must be a table, such as { soot = 0.4, sulphate = 0.6 }")
+        table.finish()
+        found.append(data)
+    return found
+
+
+def _processes(content: Any, problems: Problems) -> list[dict[str, Any]]:
+    found = []
+    for table, kind in _listed("processes", content, PROCESSES, problems):
+        data = {"name": kind.name}
+        for f in fields(kind):
+            value = table.take(f.name)
+            words = _of_process(kind, f.name)
             if value is None:
                 if f.default is MISSING:
                     table.require(f.name, words)
@@ -361,6 +386,8 @@ def model_tables(model: Model, si: bool) -> dict[str, Any]:
                     law[key] = units.text(law[key], FIELDS["kernel", key])
     tables["processes"] = [_given(p) for p in data["processes"]]
     tables["initial"] = _initial_table(model.initial, data["initial"])
+    if "attributes" in data:
+        tables["attributes"] = [_given(a) for a in data["attributes"]]
     if si:
         for (section, key), dimension in FIELDS.items():
             value = tables[section].get(key) if section != "kernel" else None

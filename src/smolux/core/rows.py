@@ -4,7 +4,7 @@ Of C kinds a row has the first C - 1; the rest of the size is of the last kind. 
 method that carries rows have, beside its own,
 
 - ``row``: of the particle that is being put in;
-- ``pool``: what those had that were taken out, and no other has yet;
+- ``mixed``: what those had that were taken out, and no other has yet;
 - ``account``: what came in and what left, of each kind, and of all in the last column;
 - ``born``: for each process what of `POOL` monomers that it brings in is of which kind.
 """
@@ -24,10 +24,10 @@ CAME, LEFT = 0, 1
 
 
 @piece
-def empty_pool(w):
+def empty(w):
     """Begin with nothing."""
-    for d in range(w.pool.shape[0]):
-        w.pool[d] = 0
+    for d in range(w.mixed.shape[0]):
+        w.mixed[d] = 0
 
 
 @piece
@@ -35,36 +35,36 @@ def fill_from_source(s, w, size):
     """Draw what a particle has that comes in."""
     born = w.born[s.count[PROCESS]]
     rest, left = np.int64(POOL), size
-    for d in range(w.pool.shape[0]):
-        w.pool[d] = hypergeometric(s.rng, rest, born[d], left)
-        w.account[CAME, d] += w.pool[d]
+    for d in range(w.mixed.shape[0]):
+        w.mixed[d] = hypergeometric(s.rng, rest, born[d], left)
+        w.account[CAME, d] += w.mixed[d]
         rest -= born[d]
-        left -= w.pool[d]
-    w.account[CAME, w.pool.shape[0]] += size
+        left -= w.mixed[d]
+    w.account[CAME, w.mixed.shape[0]] += size
 
 
 @piece
 def share_out(s, w, size, total):
-    """Write a fair share of the pool, in which there are `total` monomers, into the row."""
+    """Write a fair share of what is mixed, `total` monomers, into the row."""
     if size == total:
-        for d in range(w.pool.shape[0]):
-            w.row[d], w.pool[d] = w.pool[d], 0
+        for d in range(w.mixed.shape[0]):
+            w.row[d], w.mixed[d] = w.mixed[d], 0
         return
     rest, left = total, size
-    for d in range(w.pool.shape[0]):
-        found = hypergeometric(s.rng, rest, w.pool[d], left)
-        rest -= w.pool[d]
+    for d in range(w.mixed.shape[0]):
+        found = hypergeometric(s.rng, rest, w.mixed[d], left)
+        rest -= w.mixed[d]
         left -= found
         w.row[d] = found
-        w.pool[d] -= found
+        w.mixed[d] -= found
 
 
 @piece
 def leave(w, total):
-    """Count what is left in the pool as gone."""
-    for d in range(w.pool.shape[0]):
-        w.account[LEFT, d] += w.pool[d]
-    w.account[LEFT, w.pool.shape[0]] += total
+    """Count what is left as gone."""
+    for d in range(w.mixed.shape[0]):
+        w.account[LEFT, d] += w.mixed[d]
+    w.account[LEFT, w.mixed.shape[0]] += total
 
 
 def _deal(words, sizes, rows, pool, total):

@@ -16,7 +16,7 @@ from smolux.jit.compile import cold_piece, piece
 
 from .burst import Burst
 from .loop import Pieces
-from .rows import empty_pool, fill_from_source, leave, share_out
+from .rows import empty, fill_from_source, leave, share_out
 from .state import BOTH, FIRST, ONE, PARTICLES, SECOND
 
 
@@ -50,7 +50,7 @@ class Store(NamedTuple):
         Put the only entry in the place of both of the pair; False, with nothing changed, if it does
         not go that way.
     load : ``load(w, place)``, optional
-        Add the row of a particle to the pool, if particles have rows, see `smolux.core.rows`;
+        Add the row of a particle to ``w.mixed``, if particles have rows, see `smolux.core.rows`;
         `take` and `double` move rows with their particles, and `put` gives each of the new ones
         ``w.row``.
     """
@@ -156,7 +156,7 @@ def _make_carrying_update(
             return False
         a, b = s.count[FIRST], s.count[SECOND]
         i = j = np.int64(0)
-        empty_pool(w)
+        empty(w)
         if gone == BOTH:
             i, j = size(s, w, a), size(s, w, b)
             load(w, a)

@@ -15,7 +15,7 @@ _WORKERS = 2
 def chosen_method(plan: Plan) -> tuple[Method, str]:
     """Return the method that is best for a plan, whatever its own is, and why."""
     if plan.model.attributes:
-        return AcceptanceRejection(), "its particles carry their composition"
+        return SizeClass(), "its particles carry their composition"
     if plan.subvolumes > 1:
         return SizeClass(), "it mixes sub-volumes in the least time"
     return unforeseen(plan.physics) or choose(_circumstances(plan))

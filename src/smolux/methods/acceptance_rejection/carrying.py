@@ -40,7 +40,7 @@ class Work(NamedTuple):
     table: np.ndarray
     rows: np.ndarray
     row: np.ndarray
-    pool: np.ndarray
+    mixed: np.ndarray
     account: np.ndarray
     born: np.ndarray
 
@@ -49,7 +49,7 @@ class Work(NamedTuple):
 def _view(w, r):
     return Work(
         w.sizes[r], w.ahead[r], w.level[r], w.apart[r], w.edges, w.majorant, w.table,
-        w.rows[r], w.row[r], w.pool[r], w.account[r], w.born,
+        w.rows[r], w.row[r], w.mixed[r], w.account[r], w.born,
     )  # fmt: skip
 
 
@@ -87,15 +87,15 @@ def _room(s, w, gone, entries, p):
 
 @piece
 def _load(w, place):
-    for d in range(w.pool.shape[0]):
-        w.pool[d] += w.rows[place, d]
+    for d in range(w.mixed.shape[0]):
+        w.mixed[d] += w.rows[place, d]
 
 
 @piece
 def _take(s, w, place):
     last = s.count[STORED] - 1
     w.sizes[place] = w.sizes[last]
-    for d in range(w.pool.shape[0]):
+    for d in range(w.mixed.shape[0]):
         w.rows[place, d] = w.rows[last, d]
     s.count[STORED] = last
 
@@ -104,7 +104,7 @@ def _take(s, w, place):
 def _put(s, w, size, count, i, j, p):
     place = s.count[STORED]
     w.sizes[place] = size
-    for d in range(w.pool.shape[0]):
+    for d in range(w.mixed.shape[0]):
         w.rows[place, d] = w.row[d]
     s.count[STORED] = place + 1
 
@@ -118,7 +118,7 @@ def _double(s, w):
         renew_all(w)
     for k in range(stored):
         w.sizes[stored + k] = w.sizes[k]
-        for d in range(w.pool.shape[0]):
+        for d in range(w.mixed.shape[0]):
             w.rows[stored + k, d] = w.rows[k, d]
     for k in range(2):
         for d in range(w.account.shape[1]):
@@ -156,7 +156,7 @@ class Carrying(AcceptanceRejection):
             **plain._replace(sizes=sizes)._asdict(),
             rows=rows,
             row=np.zeros((replicas, width), np.int64),
-            pool=np.zeros((replicas, width), np.int64),
+            mixed=np.zeros((replicas, width), np.int64),
             account=np.zeros((replicas, 2, width + 1), np.int64),
             born=born,
         )

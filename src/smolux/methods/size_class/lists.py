@@ -6,6 +6,9 @@ the pool need not be larger than all lists together, but for one chunk each.
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from smolux.jit.compile import at, cold_piece, piece
@@ -35,32 +38,6 @@ def place_of(w, g, slot):
 def size_at(w, g, place):
     """Size of a particle by its class and place."""
     return np.int64(w.pool[at(place)]) if is_list(w, g) else np.int64(g)
-
-
-@piece
-def cut(w, g, place, last):
-    """Take an entry out of a list: entry `last`, now its end, moves into the gap."""
-    end, bits = w.tail[at(g)], w.meta[CHUNK]
-    w.pool[at(place)] = w.pool[at(end)]
-    prefetch(w.pool, end - _STRIDE)
-    end -= 1
-    if last & ((1 << bits) - 1) == 0:
-        w.free[at(w.meta[FREE])] = w.where[at(g), at(last >> bits)]
-        w.meta[FREE] += 1
-        end = place_of(w, g, max(last, 1) - 1)
-    w.tail[at(g)] = end
-
-
-@piece
-def append(w, g, size):
-    """Put a particle at the end of a list; there must be a free chunk."""
-    slot, bits = w.number[at(g)], w.meta[CHUNK]
-    end = w.tail[at(g)] + 1
-    if slot & ((1 << bits) - 1) == 0:
-        end = _next_chunk(w, g, slot >> bits)
-    w.tail[at(g)] = end
-    w.number[at(g)] = slot + 1
-    w.pool[at(end)] = size
 
 
 @cold_piece
@@ -106,22 +83,107 @@ def size_of_particle(w, one):
     return size_at(w, one >> SLOT_BITS, place_of_particle(w, one))
 
 
-@cold_piece
-def duplicate(w, g):
-    """Put every particle of a list in once more; there must be free chunks."""
-    bits = w.meta[CHUNK]
-    full, rest = w.number[g] >> bits, w.number[g] & ((1 << bits) - 1)
-    # full chunks are copied whole, and the one that is not full comes after them
-    partial = w.where[g, full]
-    for c in range(full):
-        end = _next_chunk(w, g, full + c)
-        start = np.int64(w.where[g, c]) << bits
-        for k in range(1 << bits):
-            w.pool[end + k] = w.pool[start + k]
-    w.number[g] = (2 * full << bits) + rest
-    if rest > 0:
-        w.where[g, 2 * full] = partial
-        for k in range(rest):
-            append(w, g, w.pool[(np.int64(partial) << bits) + k])
-    elif full > 0:
-        w.tail[g] = place_of(w, g, w.number[g] - 1)
+@piece
+def _nothing(w, place):
+    return
+
+
+@piece
+def _nothing_of(w, place, other):
+    return
+
+
+@piece
+def _move_row(w, place, other):
+    for d in range(w.rows.shape[1]):
+        w.rows[place, d] = w.rows[other, d]
+
+
+@piece
+def _write_row(w, place):
+    for d in range(w.rows.shape[1]):
+        w.rows[place, d] = w.row[d]
+
+
+@piece
+def _read_row(w, place):
+    for d in range(w.rows.shape[1]):
+        w.row[d] = w.rows[place, d]
+
+
+class Lists(NamedTuple):
+    """How entries of a list come and go.
+
+    Attributes
+    ----------
+    cut : ``cut(w, g, place, last)``
+    append : ``append(w, g, size)``
+    duplicate : ``duplicate(w, g)``
+    """
+
+    cut: Any
+    append: Any
+    duplicate: Any
+
+
+@lru_cache(maxsize=2)
+def make_lists(rows: bool) -> Lists:
+    """Bind lists of particles, with `rows` or without; see `smolux.core.rows`."""
+    move, write, read = (
+        (_move_row, _write_row, _read_row) if rows else (_nothing_of, _nothing, _nothing)
+    )
+
+    @piece
+    def cut(w, g, place, last):
+        """Take an entry out of a list: entry `last`, now its end, moves into the gap."""
+        end, bits = w.tail[at(g)], w.meta[CHUNK]
+        w.pool[at(place)] = w.pool[at(end)]
+        move(w, place, end)
+        prefetch(w.pool, end - _STRIDE)
+        end -= 1
+        if last & ((1 << bits) - 1) == 0:
+            w.free[at(w.meta[FREE])] = w.where[at(g), at(last >> bits)]
+            w.meta[FREE] += 1
+            end = place_of(w, g, max(last, 1) - 1)
+        w.tail[at(g)] = end
+
+    @piece
+    def append(w, g, size):
+        """Put a particle at the end of a list; there must be a free chunk."""
+        slot, bits = w.number[at(g)], w.meta[CHUNK]
+        end = w.tail[at(g)] + 1
+        if slot & ((1 << bits) - 1) == 0:
+            end = _next_chunk(w, g, slot >> bits)
+        w.tail[at(g)] = end
+        w.number[at(g)] = slot + 1
+        w.pool[at(end)] = size
+        write(w, end)
+
+    @cold_piece
+    def duplicate(w, g):
+        """Put every particle of a list in once more; there must be free chunks."""
+        bits = w.meta[CHUNK]
+        full, rest = w.number[g] >> bits, w.number[g] & ((1 << bits) - 1)
+        # full chunks are copied whole, and the one that is not full comes after them
+        partial = w.where[g, full]
+        for c in range(full):
+            end = _next_chunk(w, g, full + c)
+            start = np.int64(w.where[g, c]) << bits
+            for k in range(1 << bits):
+                w.pool[end + k] = w.pool[start + k]
+                move(w, end + k, start + k)
+        w.number[g] = (2 * full << bits) + rest
+        if rest > 0:
+            w.where[g, 2 * full] = partial
+            for k in range(rest):
+                place = (np.int64(partial) << bits) + k
+                read(w, place)
+                append(w, g, w.pool[place])
+        elif full > 0:
+            w.tail[g] = place_of(w, g, w.number[g] - 1)
+
+    return Lists(cut, append, duplicate)
+
+
+#: of particles without rows
+cut, append, duplicate = make_lists(False)

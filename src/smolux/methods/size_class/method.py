@@ -73,15 +73,10 @@ class SizeClass(Method):
     ) -> Work:
         replicas = len(populations)
         total = np.array([counts.sum() for _, counts in populations])
-        bits = self._bits(int(total.max()))
-        chunk = _chunk(int(total.max()))
         largest = max(int(sizes[-1]) for sizes, _ in populations)
-        top = min(max(mass, largest, 16).bit_length(), 61)
-        block = _OCTAVES << bits
-        classes = -(-(_class_of(1 << top, bits) + 1) // block) * block
-        work = _empty(replicas, classes, bits, chunk, int(total.max()), largest > _NARROW, rates)
+        work = empty_work(replicas, *self.extent(int(total.max()), largest, mass), rates)
         state.count[:, PARTICLES] = total
-        edges = slot_edges(bits)
+        edges = slot_edges(int(work.meta[0, BITS]))
         same = all(population is populations[0] for population in populations)
         for r, (sizes, counts) in enumerate(populations[:1] if same else populations):
             _fill(work, r, sizes, counts, edges)
@@ -90,6 +85,16 @@ class SizeClass(Method):
                 array[1:] = array[0]
         work.before[:] = work.number
         return work
+
+    def extent(self, most: int, largest: int, mass: int) -> tuple[int, int, int, int, bool]:
+        """Return classes, their bits and those of chunks, particles and whether entries are wide.
+
+        For so many particles at the start, of these sizes at the most.
+        """
+        bits, block = self._bits(most), _OCTAVES << self._bits(most)
+        top = min(max(mass, largest, 16).bit_length(), 61)
+        classes = -(-(_class_of(1 << top, bits) + 1) // block) * block
+        return classes, bits, _chunk(most), most, largest > _NARROW
 
     def _lacks(self, work: Work, state: State) -> tuple[int, bool]:
         """Return how many classes the sizes to be stored need, and whether wider entries."""
@@ -146,7 +151,9 @@ class SizeClass(Method):
 
     def held(self, work: Work, state: State, replica: int) -> tuple[Int, Int]:
         number, single = work.number[replica], int(work.meta[0, SINGLE])
-        lists = [_members(work, replica, g) for g in range(single, len(number)) if number[g]]
+        lists = [
+            members(work, replica, g, work.pool) for g in range(single, len(number)) if number[g]
+        ]
         return number[:single], np.concatenate([*lists, np.zeros(0, np.int64)])
 
     def split(self, work: Work, state: State, number: int, copies: int, words: Words) -> list[Part]:
@@ -159,7 +166,7 @@ class SizeClass(Method):
             number[: len(part.number)] += part.number
         total, bits = int(number.sum()), parts[0].bits
         wide = max(part.widest for part in parts) > _NARROW
-        work = _empty(1, len(number), bits, _chunk(total), total, wide, rates)
+        work = empty_work(1, len(number), bits, _chunk(total), total, wide, rates)
         state.count[0, PARTICLES] = total
         collect(work, parts)
         work.before[:] = work.number
@@ -183,6 +190,11 @@ class SizeClass(Method):
             work.meta[0, SPAN], state.count[0, SINCE] = span, since
             work.flow[0, :n] = flow[:n]
 
+    def carrying(self) -> Method:
+        from .carrying import Carrying
+
+        return Carrying(self.classes)
+
     def bytes_per_replica(self, particles: int) -> int:
         # as for monomers: four bytes a particle, and what grows with the classes
         bits, chunk = self._bits(particles), _chunk(particles)
@@ -200,7 +212,7 @@ def _class_of(size: int, bits: int) -> int:
     return int(np.searchsorted(slot_edges(bits), size, side="right")) - 1
 
 
-def _empty(
+def empty_work(
     replicas: int, classes: int, bits: int, chunk: int, particles: int, wide: bool, rates: Rates
 ) -> Work:
     """Make arrays for this many classes, without particles."""
@@ -269,13 +281,13 @@ def _fill(work: Work, r: int, sizes: Int, counts: Int, edges: Int) -> None:
         work.tail[r, g] = (int(taken[-1]) << chunk) + len(part) - 1
 
 
-def _members(work: Work, r: int, g: int) -> Int:
-    """Sizes of the particles of a list."""
+def members(work: Any, r: int, g: int, of: Any) -> Int:
+    """Return what an array has at the places of a list: the sizes, of the pool."""
     chunk = int(work.meta[r, CHUNK])
     n = int(work.number[r, g])
     places = work.where[r, g, : -(-n >> chunk)].astype(np.int64) << chunk
-    held = work.pool[r, (places[:, None] + np.arange(1 << chunk)).ravel()[:n]]
-    return held.astype(np.int64)
+    held: Int = of[r, (places[:, None] + np.arange(1 << chunk)).ravel()[:n]].astype(np.int64)
+    return held
 
 
 def _more_classes(work: Work, classes: int) -> Work:

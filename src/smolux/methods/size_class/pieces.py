@@ -26,12 +26,14 @@ from .table import prepare
 
 
 @piece
-def _size(s, w, place):
+def size(s, w, place):
+    """Size of a particle."""
     return size_of_particle(w, place)
 
 
 @piece
-def _pick(s, w, r, c):
+def pick(s, w, r, c):
+    """See `smolux.core.loop.Pieces`."""
     first, last, low, high = slots_with(c, w.meta[BITS])
     total, largest = np.int64(0), largest_rate(s, r, low, high)
     for g in range(first, min(last + 1, w.number.shape[0])):
@@ -92,7 +94,9 @@ def _raise_bound(w, g, h, value):
     w.meta[STALE] = 1
 
 
-def _make_find(rate: Any) -> Any:
+def make_find(rate: Any) -> Any:
+    """Bind the search for the next pair, see `smolux.core.burst.Burst`."""
+
     @cold_piece
     def look_beside(w, g, size, p):
         """Try a size that broke one bound with one particle of each class: it may break more."""
@@ -159,7 +163,8 @@ def _make_find(rate: Any) -> Any:
     return find
 
 
-def _make_draw(find: Any) -> Any:
+def make_draw(find: Any) -> Any:
+    """Bind the drawing of a pair, see `smolux.core.loop.Pieces`."""
     draw_one = make_draw_one(find)
 
     @piece
@@ -190,7 +195,8 @@ def _remove(w, gone, a, place_a, b, place_b):
 
 
 @piece
-def _room(s, w, gone, entries, p):
+def room(s, w, gone, entries, p):
+    """See `smolux.core.store.Store`."""
     chunks = together = np.int64(0)
     for e in range(entries):
         together += listed(w, s.sizes[e], s.counts[e])
@@ -237,6 +243,6 @@ def _release(s, held):
 
 def bind(rate: Any, tally: Any) -> Pieces:
     """Bind the pieces to a rate and a way to count."""
-    find = _make_find(rate)
-    store = Store(view, _size, _pick, _room, _take, _put, double, make_visit(tally))
-    return pieces_of(store, _make_draw(find), prepare, Burst(_row, _hold, find, _replace, _release))
+    find = make_find(rate)
+    store = Store(view, size, pick, room, _take, _put, double, make_visit(tally))
+    return pieces_of(store, make_draw(find), prepare, Burst(_row, _hold, find, _replace, _release))

@@ -3,37 +3,15 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from smolux.core.slots import slot_of
 from smolux.jit.compile import at, cold_piece, piece
 
-from .lists import append, cut, duplicate, is_list, place_of, size_at
+from .lists import is_list, make_lists, place_of, size_at
 from .state import AHEAD, BITS, CHUNK, FREE, NEXT, SHARE, SINGLE, STALE, WIDEST
-
-
-@piece
-def remove(w, g, place):
-    """Take a particle out."""
-    last = w.number[at(g)] - 1
-    w.number[at(g)] = last
-    if is_list(w, g):
-        cut(w, g, place, last)
-
-
-@piece
-def insert(w, size, count):
-    """Put particles of one size in; there must be free chunks."""
-    g = slot_of(size, w.meta[BITS])
-    if is_list(w, g):
-        for _ in range(count):
-            append(w, g, size)
-    else:
-        w.number[at(g)] += count
-    w.flow[at(g)] += SHARE * count
-    if w.number[at(g)] > w.room[at(g)]:
-        w.meta[STALE] = 1
 
 
 @piece
@@ -58,26 +36,87 @@ def chunks_for(w, size, count, together):
     return (count >> bits) + 1
 
 
-@cold_piece
-def double(s, w):
-    """Put every particle in once more; False, with nothing changed, if there is no room."""
-    bits, single = w.meta[CHUNK], w.meta[SINGLE]
-    chunks = np.int64(0)
-    for g in range(single, w.number.shape[0]):
-        end = (2 * w.number[g]) >> bits
-        chunks += end - (w.number[g] >> bits) + 1
-        if end >= w.where.shape[1]:
-            return False
-    if chunks > w.meta[FREE]:
-        return False
-    w.meta[STALE], w.meta[NEXT] = 1, AHEAD
-    for g in range(w.number.shape[0]):
-        if g < single:
-            w.number[g] *= 2
+@piece
+def _no_account(w):
+    return
+
+
+@piece
+def _double_account(w):
+    for k in range(w.account.shape[0]):
+        for d in range(w.account.shape[1]):
+            w.account[k, d] *= 2
+
+
+class Changes(NamedTuple):
+    """How particles come and go.
+
+    Attributes
+    ----------
+    remove : ``remove(w, g, place)``
+    insert : ``insert(w, size, count)``
+    double : ``double(s, w)``
+    """
+
+    remove: Any
+    insert: Any
+    double: Any
+
+
+@lru_cache(maxsize=2)
+def make_changes(rows: bool) -> Changes:
+    """Bind what happens to particles, with `rows` or without; see `smolux.core.rows`."""
+    cut, append, duplicate = make_lists(rows)
+    more = _double_account if rows else _no_account
+
+    @piece
+    def remove(w, g, place):
+        """Take a particle out."""
+        last = w.number[at(g)] - 1
+        w.number[at(g)] = last
+        if is_list(w, g):
+            cut(w, g, place, last)
+
+    @piece
+    def insert(w, size, count):
+        """Put particles of one size in; there must be free chunks."""
+        g = slot_of(size, w.meta[BITS])
+        if is_list(w, g):
+            for _ in range(count):
+                append(w, g, size)
         else:
-            duplicate(w, g)
-        w.before[g] *= 2
-    return True
+            w.number[at(g)] += count
+        w.flow[at(g)] += SHARE * count
+        if w.number[at(g)] > w.room[at(g)]:
+            w.meta[STALE] = 1
+
+    @cold_piece
+    def double(s, w):
+        """Put every particle in once more; False, with nothing changed, if there is no room."""
+        bits, single = w.meta[CHUNK], w.meta[SINGLE]
+        chunks = np.int64(0)
+        for g in range(single, w.number.shape[0]):
+            end = (2 * w.number[g]) >> bits
+            chunks += end - (w.number[g] >> bits) + 1
+            if end >= w.where.shape[1]:
+                return False
+        if chunks > w.meta[FREE]:
+            return False
+        w.meta[STALE], w.meta[NEXT] = 1, AHEAD
+        more(w)
+        for g in range(w.number.shape[0]):
+            if g < single:
+                w.number[g] *= 2
+            else:
+                duplicate(w, g)
+            w.before[g] *= 2
+        return True
+
+    return Changes(remove, insert, double)
+
+
+#: of particles without rows
+remove, insert, double = make_changes(False)
 
 
 @lru_cache(maxsize=64)
