@@ -22,8 +22,8 @@ import numpy as np
 import smolux as sx
 from benchmarks.common import loop_seconds, model, table, write_section
 from smolux.core.state import TRIALS
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.plan import Plan
-from smolux.stochastic.planning import make_plan
 from smolux.stochastic.replicas import Group
 
 CLASSES, AR, LOW_RANK = "size-class", "acceptance-rejection", "low-rank"

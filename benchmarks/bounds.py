@@ -23,7 +23,7 @@ import numpy as np
 
 import smolux as sx
 from benchmarks.common import table, write_section
-from smolux.stochastic import remembered, tables
+from smolux.stochastic import bounds_cache, tables
 
 _REPEATS = 5
 
@@ -68,7 +68,7 @@ def run(kernel: Any, method: str) -> float:
 
 def forget() -> None:
     """Forget what this process knows."""
-    remembered._bounds_of.cache_clear()
+    bounds_cache._bounds_of.cache_clear()
     tables.latest.forget()
 
 

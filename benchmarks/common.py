@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import smolux as sx
-from smolux.stochastic.planning import make_plan
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.replicas import Group
 
 RESULTS = Path(__file__).with_name("RESULTS.md")

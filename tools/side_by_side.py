@@ -87,7 +87,7 @@ def argument_sets(count: int) -> list[dict[str, Any]]:
 def plans() -> dict[str, str]:
     """Return what becomes of each set of arguments: the plan, or what is wrong with them."""
     import smolux as sx
-    from smolux.stochastic.planning import make_plan
+    from smolux.stochastic.make_plan import make_plan
 
     model = sx.Model(sx.kernels.Additive(), initial=sx.initial.from_sizes({2: 1.5, 7: 0.5}))
     found = {}

@@ -15,7 +15,7 @@ import smolux as sx
 from shared import EVERY, Low, extinction, repaired
 from smolux.core.state import EVENTS, LARGEST, MONOMERS, SMALLEST, STORED
 from smolux.kernels.formula_kernel import FormulaKernel
-from smolux.stochastic.planning import make_plan
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.replicas import Group
 
 

@@ -15,7 +15,7 @@ from smolux import exact
 from smolux.core.state import TRIALS
 from smolux.kernels import Kernel, Majorant
 from smolux.kernels.formula_kernel import FormulaKernel
-from smolux.stochastic.planning import make_plan
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.replicas import Group
 
 pytestmark = extinction

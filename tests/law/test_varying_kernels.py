@@ -16,9 +16,9 @@ from smolux.errors import InputError
 from smolux.exact import finite
 from smolux.exact.find import solution
 from smolux.kernels import Sum, from_dict
-from smolux.methods.choose import unforeseen
+from smolux.methods.costs import unforeseen
 from smolux.stochastic import checkpoint as checkpoints
-from smolux.stochastic.planning import make_plan
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.replicas import Group
 from smolux.stochastic.time_windows import time_windows_for
 

@@ -16,7 +16,7 @@ import pytest
 import smolux as sx
 from shared import QUICK, extinction
 from smolux.errors import InputError
-from smolux.stochastic.planning import make_plan
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.rates import rates_for
 
 METHODS = [method.name for method in sx.methods.METHODS]

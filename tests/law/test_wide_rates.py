@@ -13,7 +13,7 @@ import smolux as sx
 from shared import EVERY, extinction, laborious, repaired
 from smolux.core.state import TRIALS
 from smolux.methods import METHODS
-from smolux.stochastic.planning import make_plan
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.replicas import Group
 
 pytestmark = [extinction, laborious]

@@ -11,8 +11,8 @@ import pytest
 import smolux as sx
 from shared import FORMULA, QUICK, VARYING
 from smolux.stochastic import checkpoint as checkpoints
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.plan import Plan
-from smolux.stochastic.planning import make_plan
 from smolux.stochastic.replicas import Group
 
 METHODS = [method.name for method in sx.methods.METHODS]

@@ -10,7 +10,8 @@ import pytest
 
 import smolux as sx
 from smolux.errors import InputError
-from smolux.stochastic import plan, planning
+from smolux.stochastic import make_plan as make_plan_of
+from smolux.stochastic import plan
 
 MODEL = sx.Model(sx.kernels.Constant())
 
@@ -103,7 +104,7 @@ def test_memory_is_refused_before_anything_is_computed(monkeypatch: pytest.Monke
     monkeypatch.setattr(plan, "available_memory", lambda: None)
     assert (
         plan.check_memory(
-            planning.make_plan(
+            make_plan_of.make_plan(
                 MODEL,
                 [1.0],
                 method="inverse",
@@ -121,7 +122,7 @@ def test_memory_is_refused_before_anything_is_computed(monkeypatch: pytest.Monke
 
 def test_what_is_accepted() -> None:
     given: dict[str, Any] = {"weighting": "number", "population": "none", "seed": 2**200}
-    made = planning.make_plan(
+    made = make_plan_of.make_plan(
         MODEL,
         2,
         method=sx.methods.METHODS[0](),

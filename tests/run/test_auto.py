@@ -9,7 +9,7 @@ import pytest
 
 import smolux as sx
 from shared import FORMULA
-from smolux.methods.choose import Circumstances, choose, effort
+from smolux.methods.costs import Circumstances, choose, effort
 from smolux.stochastic.rates import rates_for
 from smolux.weighting import Number
 
@@ -30,7 +30,7 @@ def test_a_constant_kernel_is_never_rejected() -> None:
     [("ballistic", 20_000, 20.0), ("additive", 5_000, 1.0)],
 )
 def test_the_estimate_is_near_what_a_run_needs(law: str, particles: int, end: float) -> None:
-    from smolux.stochastic.planning import make_plan
+    from smolux.stochastic.make_plan import make_plan
     from smolux.stochastic.replicas import Group
 
     given = {"c0": 0.0, "c1": 0.0, "c2": 0.0, "c3": 0.0}

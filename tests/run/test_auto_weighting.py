@@ -16,10 +16,11 @@ from smolux import case as cases
 from smolux.cli.commands import run as command
 from smolux.errors import InputError
 from smolux.settings.target_error import Target
-from smolux.stochastic import checkpoint, choose_weighting, planning
+from smolux.stochastic import checkpoint, choose_weighting
+from smolux.stochastic import make_plan as make_plan_of
 from smolux.stochastic.choose_method import event_cost
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.plan import Plan
-from smolux.stochastic.planning import make_plan
 
 METHOD = "acceptance-rejection"
 KERNEL = sx.kernels.formula(FORMULA, c0=1.0, c1=0.0, c2=0.0, c3=0.0)
@@ -144,7 +145,7 @@ def test_the_choice_goes_into_checkpoints(tmp_path: Any) -> None:
 
 def test_a_begun_run_is_known_by_what_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     chosen = sx.weighting.MassFlow(), "in a pilot"
-    monkeypatch.setattr(planning, "chosen_weighting", lambda model, settings: chosen)
+    monkeypatch.setattr(make_plan_of, "chosen_weighting", lambda model, settings: chosen)
     text = '[kernel]\nname = "constant"\n[run]\ntimes = [4]\nseed = 5\nweighting = '
     for asked in (
         '"auto"\ntarget = "n_50"', '"weight-function"\nexponent = 0.5', '"mass-flow"'

@@ -19,7 +19,7 @@ import smolux as sx
 from smolux.functions.law import Law
 from smolux.kernels import Additive
 from smolux.runtime import files
-from smolux.stochastic import remembered, tables
+from smolux.stochastic import bounds_cache, tables
 from smolux.stochastic.rates import rates_for
 from smolux.weighting import MassFlow, Number, WeightFunction
 
@@ -30,7 +30,7 @@ height = 1.0
 @pytest.fixture(autouse=True)
 def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
     """Begin with nothing that is remembered; compiled code is where it always is."""
-    monkeypatch.setattr(remembered, "cache_directory", lambda: tmp_path)
+    monkeypatch.setattr(bounds_cache, "cache_directory", lambda: tmp_path)
     forget()
     yield tmp_path / "bounds"
     forget()
@@ -38,7 +38,7 @@ def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
 
 def forget() -> None:
     """Forget all, as a new process does."""
-    remembered._bounds_of.cache_clear()
+    bounds_cache._bounds_of.cache_clear()
     tables.latest.forget()
 
 
@@ -110,7 +110,7 @@ def test_no_more_than_some_are_remembered() -> None:
         lower, upper = rates.bounds(*(side + k for side in BOXES))
         assert (lower <= upper).all()
     kept = rates.bounds.__wrapped__  # type: ignore[attr-defined]
-    assert len(kept._known) <= remembered._MOST
+    assert len(kept._known) <= bounds_cache._MOST
 
 
 # --- on disk -------------------------------------------------------------------------------------
@@ -233,7 +233,7 @@ def test_other_code_finds_its_own(monkeypatch: pytest.MonkeyPatch, folder: Path)
         found(kernel, BOXES)
         before = set(folder.iterdir())
         forget()
-        monkeypatch.setattr(remembered, decides, lambda decides=decides: f"another {decides}")
+        monkeypatch.setattr(bounds_cache, decides, lambda decides=decides: f"another {decides}")
         found(kernel, BOXES)
         assert len(set(folder.iterdir()) - before) == 1
         forget()
@@ -245,7 +245,7 @@ def test_without_a_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, where
     right = kernel.bounds(*BOXES)
     (tmp_path / "file").write_text("")
     given = tmp_path / "file" if where == "a file" else None
-    monkeypatch.setattr(remembered, "cache_directory", lambda: given)
+    monkeypatch.setattr(bounds_cache, "cache_directory", lambda: given)
     np.testing.assert_array_equal(found(kernel, BOXES), right)
 
 
@@ -253,8 +253,8 @@ def test_the_folder_does_not_grow_without_end(
     monkeypatch: pytest.MonkeyPatch, folder: Path
 ) -> None:
     kernel = sx.kernels.from_function(step)
-    monkeypatch.setattr(remembered, "_MOST_FILES", 6)
-    monkeypatch.setattr(remembered, "_BETWEEN", 1)
+    monkeypatch.setattr(bounds_cache, "_MOST_FILES", 6)
+    monkeypatch.setattr(bounds_cache, "_BETWEEN", 1)
     folder.mkdir()
     for name, age in ((".old.01234567", 2.0 * files._STALE_SECONDS), (".new.01234567", 0.0)):
         left = folder / name
@@ -293,15 +293,15 @@ def test_runs_are_the_same_bit_for_bit(folder: Path, method: str) -> None:
 @pytest.mark.parametrize("method", ["size-class"])
 def test_the_time_is_a_number_of_its_own(monkeypatch: pytest.MonkeyPatch, method: str) -> None:
     ticks = iter(range(10**9))
-    monkeypatch.setattr(remembered.time, "thread_time", lambda: float(next(ticks)))
+    monkeypatch.setattr(bounds_cache.time, "thread_time", lambda: float(next(ticks)))
     told: list[Any] = []
     given = {"particles": 150, "replicas": 3, "seed": 5, "progress": told.append}
     ds = sx.simulate(runs.model(), [1.0, 3.0], method=method, **given)
     assert ds.attrs["bounds_seconds"] >= 2.0  # windows of time, and bounds of pairs of classes
     assert told[-1].bounds_seconds == ds.attrs["bounds_seconds"]
-    before = remembered.spent()
+    before = bounds_cache.spent()
     runs.plan(runs.model(), [1.0, 3.0], "auto")
-    assert remembered.spent() > before
+    assert bounds_cache.spent() > before
 
 
 def larger_first(i: float, j: float) -> float:

@@ -17,7 +17,7 @@ from smolux import processes
 from smolux.deterministic.splitting import Splits
 from smolux.functions.content import digest, frozen, is_frozen
 from smolux.jit.compile import user_piece
-from smolux.stochastic.planning import make_plan
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.time_windows import time_windows_for
 
 slow = pytest.mark.slow

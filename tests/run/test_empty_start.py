@@ -10,8 +10,8 @@ import pytest
 import smolux as sx
 from smolux import processes
 from smolux.cli.estimate import Pilot
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.plan import Plan
-from smolux.stochastic.planning import make_plan
 from smolux.stochastic.time_windows import time_windows_for
 
 

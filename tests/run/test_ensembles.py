@@ -23,7 +23,7 @@ from smolux.ensembles.ensemble import Collected
 from smolux.errors import InputError
 from smolux.exact import finite
 from smolux.settings.target_error import Target
-from smolux.stochastic.planning import make_plan
+from smolux.stochastic.make_plan import make_plan
 
 METHOD = "acceptance-rejection"
 MODEL = sx.Model(kernel=sx.kernels.Constant())

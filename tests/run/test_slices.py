@@ -24,7 +24,7 @@ from smolux.methods.low_rank.store import POOL_NEEDED, TAIL
 from smolux.methods.size_class import method as size_class
 from smolux.methods.size_class.state import CHUNK, FREE
 from smolux.runtime import files
-from smolux.stochastic.planning import make_plan
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.replicas import Group
 
 slow = pytest.mark.slow

@@ -21,9 +21,9 @@ from smolux.observables import recorded
 from smolux.settings.target_error import StoppingRule, Trial, assess, plan_replicas
 from smolux.stochastic import driving, replicas
 from smolux.stochastic import simulation as stochastic
+from smolux.stochastic.make_plan import make_plan
 from smolux.stochastic.observe import observable
 from smolux.stochastic.plan import PILOT
-from smolux.stochastic.planning import make_plan
 
 pytestmark = shared.stopped
 

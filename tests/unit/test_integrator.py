@@ -18,7 +18,7 @@ from smolux.deterministic.terms import Totals
 from smolux.deterministic.timemesh import TimeMesh
 from smolux.deterministic.window import Window
 from smolux.errors import InputError, Interrupted, SmoluxWarning
-from smolux.stochastic.planning import make_plan
+from smolux.stochastic.make_plan import make_plan
 
 AGGREGATION = sx.processes.Aggregation()
 

@@ -23,7 +23,7 @@ from smolux.settings import (
     from_plain,
     plain,
 )
-from smolux.stochastic.planning import make_plan
+from smolux.stochastic.make_plan import make_plan
 
 MODEL = sx.Model(sx.kernels.Constant())
 CASE = '[kernel]\nname = "constant"\n'

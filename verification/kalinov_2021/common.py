@@ -95,7 +95,7 @@ def second_moments(
 
 def loop_seconds(physics: sx.Model, time_end: float, particles: int, method: str) -> float:
     """Processor seconds of the event loop of one run, compilation and set-up left out."""
-    from smolux.stochastic.planning import make_plan
+    from smolux.stochastic.make_plan import make_plan
     from smolux.stochastic.replicas import Group
 
     plan = make_plan(

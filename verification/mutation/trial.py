@@ -30,7 +30,7 @@ _KEEPERS = frozenset(
     (
         "functions/content.py",
         "runtime/files.py",
-        "stochastic/remembered.py",
+        "stochastic/bounds_cache.py",
         "stochastic/tables.py",
         "jit/compile.py",
         "jit/pipeline.py",

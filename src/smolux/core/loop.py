@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 from smolux.jit.compile import cold_piece, entry, piece
 
-from .after import make_after_event
+from .after_event import make_after_event
 from .burst import Burst
 from .record import make_record
 from .state import (

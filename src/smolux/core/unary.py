@@ -3,7 +3,7 @@
 The particles are counted in slots of sizes, an eighth of an octave each, and every slot remembers
 the largest rate of what was in it since it was last empty. So the sum of the rates of all is known
 to within what rates differ in a slot, whatever a few large particles do. A slot is drawn by its
-sum, with what the store holds together with it (`smolux.core.together`), a particle of that by the
+sum, with what the store holds together with it (`smolux.core.pick`), a particle of that by the
 largest rates of their slots, and thinned by its own rate. The bounds are rates of sizes
 that are there, not of sizes that were tried: a rate that is not zero at one size only is not
 overlooked.

@@ -25,9 +25,9 @@ from smolux.model import Model
 from smolux.runtime.progress import Progress
 from smolux.settings import Settings
 from smolux.settings.target_error import Target, named
+from smolux.stochastic.make_plan import decided
 from smolux.stochastic.observe import observable
 from smolux.stochastic.plan import Plan
-from smolux.stochastic.planning import decided
 from smolux.stochastic.replicas import Group, empty_state, initial_populations
 from smolux.stochastic.totals import Totals, attempts_of
 from smolux.weighting.base import Weighting

@@ -11,7 +11,7 @@ from smolux.functions.formula import Formula, check_names, parse
 from smolux.functions.law import Law
 from smolux.functions.user_function import wrong_number
 
-from .own import SIZES, OwnKernel
+from .user_kernel import SIZES, OwnKernel
 
 #: words with a meaning in the table of a kernel
 _KEYS = ("name", "formula", "terms", "coefficient", "varying")

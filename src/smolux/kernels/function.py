@@ -14,7 +14,7 @@ from smolux.functions.law import Law
 from smolux.functions.stated import StatedBounds, statements
 from smolux.functions.user_function import Function, wrong_number
 
-from .own import SIZES, OwnKernel
+from .user_kernel import SIZES, OwnKernel
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ from smolux.functions.time import TimeFunction
 
 from .base import Kernel, widen
 from .check import sample_sizes
+from .composite import MadeOfKernels
 from .constant import Constant
 from .formula_kernel import formula
 from .function import from_function
-from .made import MadeOfKernels
 from .majorant import Majorant
 from .registry import from_dict
 

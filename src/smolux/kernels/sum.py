@@ -17,7 +17,7 @@ from smolux.functions.intervals import Interval
 from smolux.functions.time import TimeFunction
 
 from .base import Float, Kernel
-from .made import MadeOfKernels
+from .composite import MadeOfKernels
 from .majorant import Majorant
 from .varying import ONE
 

@@ -12,7 +12,7 @@ import numpy as np
 from smolux.errors import about
 from smolux.functions.user_function import spread
 from smolux.kernels.base import Kernel
-from smolux.kernels.numeric import SAFETY
+from smolux.kernels.numeric_bounds import SAFETY
 from smolux.kernels.shared import pair_law
 
 from .base import Float, UnaryProcess, Varying

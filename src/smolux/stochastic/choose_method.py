@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from smolux.methods import AcceptanceRejection, Method, SizeClass
-from smolux.methods.choose import Circumstances, choose, costs, unforeseen
+from smolux.methods.costs import Circumstances, choose, costs, unforeseen
 from smolux.processes.base import PairProcess
 
 from .plan import Plan

@@ -14,7 +14,7 @@ from smolux.processes import Aggregation, Source
 from smolux.processes.base import PairProcess, Process, UnaryProcess
 from smolux.weighting import Number
 
-from .remembered import bounds_of, timed
+from .bounds_cache import bounds_of, timed
 
 
 def share_laws(pairs: Sequence[PairProcess]) -> list[Kernel]:

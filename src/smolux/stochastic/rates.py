@@ -9,7 +9,7 @@ from smolux.methods.base import Rates
 from smolux.model import Model
 from smolux.weighting.base import Weighting
 
-from .remembered import bounds_of, timed
+from .bounds_cache import bounds_of, timed
 from .tables import evaluated, latest
 
 

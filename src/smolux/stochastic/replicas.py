@@ -60,10 +60,10 @@ from smolux.processes.base import PairProcess, UnaryProcess, text_of
 from smolux.runtime import room
 
 from .assembly import uncompilable
+from .bounds_cache import spent
 from .carrying import carrying_work, joint_population, observe_rows, tally_shape
 from .parameters import bound_splits, factor_parameters
 from .plan import Plan
-from .remembered import spent
 
 Int = NDArray[np.int64]
 

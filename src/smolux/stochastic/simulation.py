@@ -22,9 +22,9 @@ from smolux.settings import Control, Settings
 from smolux.weighting.base import Weighting
 
 from . import checkpoint as checkpoints
+from .bounds_cache import spent
 from .driving import ExecutorRun, ThreadRun
-from .planning import decided
-from .remembered import spent
+from .make_plan import decided
 from .subvolumes import start
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from smolux.processes.base import PairProcess, Process, factors_of
 from smolux.weighting import Number
 from smolux.weighting.base import Weighting
 
-from .remembered import timed
+from .bounds_cache import timed
 
 #: windows of time for bounds of a factor that varies: pieces of each octave, first octave
 _PIECES = 4

@@ -13,7 +13,7 @@ from smolux.functions.intervals import Interval
 from smolux.functions.law import proved_or_tried
 from smolux.kernels.base import Kernel
 from smolux.kernels.majorant import Majorant
-from smolux.kernels.numeric import interval_bounds, sampled_bounds
+from smolux.kernels.numeric_bounds import interval_bounds, sampled_bounds
 
 Float = NDArray[np.float64]
 

@@ -102,7 +102,7 @@ def _planned(case: Case, run: Run) -> None:
     Settings.for_model(case.model, given)
     most = stores_at_most(run) + output(case, run)
     if given["weighting"] != "number" or (available is not None and most > _PLENTY * available):
-        from smolux.stochastic.planning import make_plan  # which loads Numba, for nothing else
+        from smolux.stochastic.make_plan import make_plan  # which loads Numba, for nothing else
 
         make_plan(case.model, **given)
 

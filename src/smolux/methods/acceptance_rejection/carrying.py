@@ -10,10 +10,10 @@ import numpy as np
 from smolux.core import rng
 from smolux.core.bounds import note_largest
 from smolux.core.loop import Pieces
+from smolux.core.pick import largest_rate, takes
 from smolux.core.slots import slot_of
 from smolux.core.state import LARGEST, MONOMERS, SMALLEST, STORED, TRIALS, UNARY_BITS, State
 from smolux.core.store import Store, pieces_of
-from smolux.core.together import largest_rate, takes
 from smolux.jit.compile import cold_piece, piece
 from smolux.methods.base import Int, Rates, Rows, enlarged
 

@@ -12,6 +12,7 @@ from smolux.core import rng
 from smolux.core.bounds import ROUNDING, note_bad, note_largest, repair
 from smolux.core.burst import NOT_PLAIN, PLAIN, Burst, make_draw_one
 from smolux.core.loop import PATIENCE, Pieces
+from smolux.core.pick import largest_rate, takes
 from smolux.core.slots import slot_of
 from smolux.core.state import (
     FIRST,
@@ -30,7 +31,6 @@ from smolux.core.state import (
     VOLUME,
 )
 from smolux.core.store import Store, pieces_of
-from smolux.core.together import largest_rate, takes
 from smolux.jit.compile import at, cold_piece, piece
 from smolux.jit.prefetch import prefetch
 

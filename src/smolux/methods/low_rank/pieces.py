@@ -10,9 +10,9 @@ import numpy as np
 from smolux.core import rng
 from smolux.core.bounds import ROUNDING, note_bad, repair
 from smolux.core.loop import PATIENCE, Pieces
+from smolux.core.pick import largest_rate, slots_with, takes
 from smolux.core.state import FIRST, FLOOR, PARTICLES, SECOND, TRIALS, VALUE, VOLUME
 from smolux.core.store import Store, pieces_of
-from smolux.core.together import largest_rate, slots_with, takes
 from smolux.jit.compile import cold_piece, piece
 from smolux.jit.prefetch import prefetch
 

@@ -11,9 +11,9 @@ from smolux.core import rng
 from smolux.core.bounds import ROUNDING, note_bad, repair
 from smolux.core.burst import LAST, NOT_PLAIN, PLAIN, Burst, make_draw_one
 from smolux.core.loop import PATIENCE, Pieces
+from smolux.core.pick import largest_rate, slots_with, takes
 from smolux.core.state import FIRST, MAJORANT, PARTICLES, SINCE, TRIALS, VOLUME
 from smolux.core.store import Store, pieces_of
-from smolux.core.together import largest_rate, slots_with, takes
 from smolux.jit.compile import at, cold_piece, piece
 from smolux.jit.prefetch import prefetch
 from smolux.jit.wide import upper_half

@@ -14,7 +14,7 @@ from smolux.functions.intervals import Interval
 from smolux.functions.law import Law, proved_or_tried
 
 from .base import Float, Kernel
-from .numeric import NUMBERS, always_bounded, interval_bounds, sampled_bounds
+from .numeric_bounds import NUMBERS, always_bounded, interval_bounds, sampled_bounds
 
 SIZES = ("i", "j")
 
