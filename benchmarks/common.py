@@ -106,6 +106,7 @@ python benchmarks/estimators.py
 python benchmarks/auto.py
 python benchmarks/parallel.py
 python benchmarks/breakage.py
+python benchmarks/composition.py
 python benchmarks/bounds.py
 ```
 """

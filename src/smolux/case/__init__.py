@@ -20,7 +20,8 @@ from smolux.model import Model
 from smolux.settings.solution import OBSERVED
 
 from .lines import Path, line_numbers
-from .physics import build, model_tables, read_physics
+from .model_tables import model_tables
+from .physics import build, read_physics
 from .reader import Problems, Table
 from .settings import (
     Output,

@@ -16,6 +16,7 @@ import numpy as np
 from smolux.jit.compile import entry, piece
 
 from .hypergeometric import hypergeometric
+from .record import find_bin
 from .state import PROCESS
 
 #: as many monomers as sources are taken to draw from: drawing with and without return is the same
@@ -81,3 +82,25 @@ def _deal(words, sizes, rows, pool, total):
 
 #: ``deal(words, sizes, rows, pool, total)``: give each of some particles its share of a pool
 deal = entry(_deal)
+
+
+def _observe(sizes, rows, grid, most, out):
+    kinds, total = out.shape[1], out.shape[0] - 2
+    for k in range(sizes.shape[0]):
+        size = sizes[k]
+        rest = size
+        place = size - 1 if size <= most else most + find_bin(grid, size)
+        unit = 1.0 if size <= most else 1.0 / size
+        for c in range(kinds):
+            x = rows[k, c] if c < kinds - 1 else rest
+            rest -= x
+            value = x * unit
+            out[place, c, 0] += value
+            out[place, c, 1] += value * value
+            out[total, c, 0] += x
+            out[total, c, 1] += float(x) * x / size
+
+
+#: ``observe(sizes, rows, grid, most, out)``: add sums over particles, see
+#: `smolux.stochastic.carrying.observe_rows`
+observe = entry(_observe)

@@ -149,7 +149,7 @@ def _make_carrying_update(
     put: Callable[..., Any],
     load: Callable[..., Any],
 ) -> Callable[..., Any]:
-    @cold_piece
+    @piece
     def update(s, w, gone, entries, p):
         """As without rows; what those that vanish had is shared out to those that appear."""
         if not room(s, w, gone, entries, p):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from smolux.attributes import Composition
 from smolux.attributes.composition import rounded
-from smolux.core.rows import POOL, deal
+from smolux.core.rows import POOL, deal, observe
 from smolux.core.seeds import stream
 from smolux.core.state import State
 from smolux.methods.base import Rows
@@ -78,16 +78,7 @@ def observe_rows(plan: Plan, sizes: Int, rows: Int, account: Int, out: Float) ->
     all; and what came in and what left.
     """
     out[:] = 0.0
-    numbers = whole(sizes, rows).astype(float)
-    small = sizes <= plan.sizes
-    moments = np.stack([numbers, numbers**2], axis=-1)
-    np.add.at(out, sizes[small] - 1, moments[small])
-    if not small.all():
-        place = np.searchsorted(plan.grid.edges, sizes[~small], side="right") - 1
-        fractions = numbers[~small] / sizes[~small, None]
-        np.add.at(out, plan.sizes + place, np.stack([fractions, fractions**2], axis=-1))
-    out[-2, :, 0] = numbers.sum(axis=0)
-    out[-2, :, 1] = (numbers**2 / sizes[:, None]).sum(axis=0)
+    observe(sizes, rows, plan.grid, plan.sizes, out)
     known, total = account[:, :-1], account[:, -1:]
     out[-1] = np.column_stack([known, total - known.sum(axis=1, keepdims=True)]).T
 

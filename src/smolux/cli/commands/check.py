@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from smolux.case import Case, Parallel, Run, load, spatial
-from smolux.case.physics import model_tables
+from smolux.case.model_tables import model_tables
 from smolux.case.settings import as_table
 from smolux.case.write import value
 from smolux.cli import spatial_run
@@ -120,6 +120,7 @@ def description(case: Case) -> list[str]:
         f"kernel       {_words(tables['kernel'])}",
         f"processes    {processes}",
         f"initial      {_words(tables['initial'])}",
+        *(f"{a['name']:12s} {_words(a)}" for a in tables.get("attributes", ())),
         f"times        {len(case.times)}, up to {case.times[-1]:g}{t}",
     ]
     if case.run is not None:

@@ -43,8 +43,20 @@ def text(ds: Any, most: int = MOST) -> str:
     lines = [str(attributes.get("title", "")), ", ".join(f for f in facts if f), ""]
     lines.append(smolux.analysis.format_table(chosen(ds, most)).rstrip())
     lines.append(shown(ds, most))
-    lines += _warnings(ds)
+    lines += [*_mixing(ds), *_warnings(ds)]
     return "\n".join(line for n, line in enumerate(lines) if line or n == 2).strip()
+
+
+def _mixing(ds: Any) -> list[str]:
+    """Say how mixed the particles are at the end, if they carry a composition."""
+    if "mixing" not in ds:
+        return []
+    last = ds["mixing"].isel(time=-1)
+    kinds = ", ".join(str(kind) for kind in ds["component"].values)
+    return [
+        f"Composition of {kinds}: the scatter among particles at the end is "
+        f"{float(last.mean()):.3g} of that of pure ones (mixing)."
+    ]
 
 
 def _warnings(ds: Any) -> list[str]:

@@ -9,12 +9,13 @@ import numpy as np
 
 from smolux.core import rng
 from smolux.core.bounds import note_largest
+from smolux.core.burst import NOT_PLAIN, PLAIN, Burst
 from smolux.core.loop import Pieces
 from smolux.core.pick import largest_rate, takes
 from smolux.core.slots import slot_of
 from smolux.core.state import LARGEST, MONOMERS, SMALLEST, STORED, TRIALS, UNARY_BITS, State
 from smolux.core.store import Store, pieces_of
-from smolux.jit.compile import cold_piece, piece
+from smolux.jit.compile import at, cold_piece, piece
 from smolux.methods.base import Int, Rates, Rows, enlarged
 
 from . import pieces
@@ -27,8 +28,9 @@ class Work(NamedTuple):
 
     Attributes
     ----------
-    rows : int64 array of shape (R, capacity, D)
-        What each particle carries, and the others of `smolux.core.rows`.
+    rows : int64 array of shape (R, capacity D)
+        What each particle carries, the D numbers of one after those of the one
+        before; and the others of `smolux.core.rows`.
     """
 
     sizes: np.ndarray
@@ -87,25 +89,26 @@ def _room(s, w, gone, entries, p):
 
 @piece
 def _load(w, place):
-    for d in range(w.mixed.shape[0]):
-        w.mixed[d] += w.rows[place, d]
+    width = w.mixed.shape[0]
+    for d in range(width):
+        w.mixed[d] += w.rows[at(place * width + d)]
 
 
 @piece
 def _take(s, w, place):
-    last = s.count[STORED] - 1
-    w.sizes[place] = w.sizes[last]
-    for d in range(w.mixed.shape[0]):
-        w.rows[place, d] = w.rows[last, d]
+    last, width = s.count[STORED] - 1, w.mixed.shape[0]
+    w.sizes[at(place)] = w.sizes[at(last)]
+    for d in range(width):
+        w.rows[at(place * width + d)] = w.rows[at(last * width + d)]
     s.count[STORED] = last
 
 
 @piece
 def _put(s, w, size, count, i, j, p):
-    place = s.count[STORED]
-    w.sizes[place] = size
-    for d in range(w.mixed.shape[0]):
-        w.rows[place, d] = w.row[d]
+    place, width = s.count[STORED], w.mixed.shape[0]
+    w.sizes[at(place)] = size
+    for d in range(width):
+        w.rows[at(place * width + d)] = w.row[d]
     s.count[STORED] = place + 1
 
 
@@ -118,13 +121,32 @@ def _double(s, w):
         renew_all(w)
     for k in range(stored):
         w.sizes[stored + k] = w.sizes[k]
-        for d in range(w.mixed.shape[0]):
-            w.rows[stored + k, d] = w.rows[k, d]
+    width = w.mixed.shape[0]
+    for k in range(stored * width):
+        w.rows[stored * width + k] = w.rows[k]
     for k in range(2):
         for d in range(w.account.shape[1]):
             w.account[k, d] *= 2
     s.count[STORED] *= 2
     return True
+
+
+@piece
+def _replace(w, held, a, b, gone, size, count):
+    # two that become one: nothing is drawn
+    if gone != 3 or count != 1 or size < held.bottom or size >= held.top:
+        return NOT_PLAIN, held
+    last, width = held.stored - 1, w.mixed.shape[0]
+    low, high = min(a, b), max(a, b)
+    w.sizes[at(low)] = size
+    w.sizes[at(high)] = w.sizes[at(last)]
+    for d in range(width):
+        w.rows[at(low * width + d)] += w.rows[at(high * width + d)]
+        w.rows[at(high * width + d)] = w.rows[at(last * width + d)]
+    smallest, largest = min(held.smallest, size), max(held.largest, size)
+    return PLAIN, pieces.Held(
+        held.monomers, last, smallest, largest, held.bottom, held.top, held.unit
+    )
 
 
 @dataclass(frozen=True)
@@ -138,7 +160,9 @@ class Carrying(AcceptanceRejection):
         store = Store(
             _view, _size, _pick, _room, _take, _put, _double, pieces.make_visit(tally), load=_load
         )
-        return pieces_of(store, pieces.make_draw(pieces.make_find(rate)), pieces.prepare)
+        find = pieces.make_find(rate, True)
+        burst = Burst(pieces.row, pieces.hold, find, _replace, pieces.release)
+        return pieces_of(store, pieces.make_draw(find), pieces.prepare, burst)
 
     def carrying_work(
         self, rates: Rates, particles: list[Rows], born: Int, state: State, mass: int
@@ -154,7 +178,7 @@ class Carrying(AcceptanceRejection):
         state.count[:, MONOMERS], state.count[:, STORED] = 0, stored
         return Work(
             **plain._replace(sizes=sizes)._asdict(),
-            rows=rows,
+            rows=rows.reshape(replicas, -1),
             row=np.zeros((replicas, width), np.int64),
             mixed=np.zeros((replicas, width), np.int64),
             account=np.zeros((replicas, 2, width + 1), np.int64),
@@ -163,13 +187,13 @@ class Carrying(AcceptanceRejection):
 
     def grow(self, work: Any, state: State) -> Any:
         more = 2 * work.sizes.shape[1]
-        rows = np.zeros((len(work.rows), more, work.rows.shape[2]), np.int64)
-        rows[:, : work.rows.shape[1]] = work.rows
+        rows = enlarged(work.rows, more * work.mixed.shape[1])
         return work._replace(sizes=enlarged(work.sizes, more), rows=rows)
 
     def rows(self, work: Any, state: State, replica: int) -> Rows:
         stored = int(state.count[replica, STORED])
-        return work.sizes[replica, :stored], work.rows[replica, :stored]
+        rows = work.rows[replica].reshape(-1, work.mixed.shape[1])
+        return work.sizes[replica, :stored], rows[:stored]
 
     def bytes_per_replica(self, particles: int) -> int:
         return 8 * particles

@@ -86,8 +86,15 @@ def _ask(w, monomers, slot):
     prefetch(w.sizes, max(slot - monomers, 0))
 
 
-def make_find(rate: Any) -> Any:
-    """Bind the search for the next pair, see `smolux.core.burst.Burst`."""
+@piece
+def _ask_with_row(w, monomers, slot):
+    prefetch(w.sizes, slot)
+    prefetch(w.rows, slot * w.mixed.shape[0])
+
+
+def make_find(rate: Any, rows: bool = False) -> Any:
+    """Bind the search for the next pair, see `smolux.core.burst.Burst`; with `rows` or without."""
+    ask = _ask_with_row if rows else _ask
 
     @piece
     def value_of(w, i, j, p):
@@ -114,8 +121,8 @@ def make_find(rate: Any) -> Any:
             u, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)
             v, c0, c1, c2, c3 = rng.uniform_of(c0, c1, c2, c3)
             w.ahead[k], w.ahead[k + _ONE] = u, v
-            _ask(w, monomers, np.int64(u * n))
-            _ask(w, monomers, np.int64(v * n))
+            ask(w, monomers, np.int64(u * n))
+            ask(w, monomers, np.int64(v * n))
             i, j = size_of(w, monomers, a), size_of(w, monomers, b)
             value = value_of(w, i, j, p)
             if not 0.0 <= value <= majorant:
@@ -149,7 +156,7 @@ def make_draw(find: Any) -> Any:
         if w.ahead[0] < 0.0:
             for k in range(2 * AHEAD):
                 w.ahead[k] = rng.uniform(s.rng)
-        return draw_one(s, w, p, factor, limit, _hold(s, w, factor))
+        return draw_one(s, w, p, factor, limit, hold(s, w, factor))
 
     return draw
 
@@ -198,7 +205,8 @@ def _exchange_one(w, monomers, stored, slot, size, count):
 
 
 @piece
-def _row(s, w):
+def row(s, w):
+    """See `smolux.core.burst.Burst`."""
     if w.ahead[0] < 0.0 or s.clock[MAJORANT] <= 0.0:
         return 0
     # each event brings the next look at all sizes nearer by two at most, see `prepare`
@@ -206,7 +214,8 @@ def _row(s, w):
 
 
 @piece
-def _hold(s, w, factor):
+def hold(s, w, factor):
+    """See `smolux.core.burst.Burst`."""
     return Held(
         s.count[MONOMERS],
         s.count[STORED],
@@ -234,7 +243,8 @@ def _replace(w, held, a, b, gone, size, count):
 
 
 @piece
-def _release(s, held):
+def release(s, held):
+    """See `smolux.core.burst.Burst`."""
     s.count[MONOMERS], s.count[STORED] = held.monomers, held.stored
     s.count[SMALLEST], s.count[LARGEST] = held.smallest, held.largest
 
@@ -331,4 +341,4 @@ def bind(rate: Any, tally: Any) -> Pieces:
     store = Store(
         view, _size, _pick, _room, _take, _put, _double, make_visit(tally), _exchange_pair
     )
-    return pieces_of(store, make_draw(find), prepare, Burst(_row, _hold, find, _replace, _release))
+    return pieces_of(store, make_draw(find), prepare, Burst(row, hold, find, _replace, release))

@@ -7,20 +7,21 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from smolux.core.burst import LAST, NOT_PLAIN, PLAIN, Burst
 from smolux.core.loop import Pieces
 from smolux.core.slots import slot_edges
 from smolux.core.state import PARTICLES, State
 from smolux.core.store import Store, pieces_of
-from smolux.jit.compile import piece
-from smolux.methods.base import Int, Rates, Rows, Words
+from smolux.jit.compile import at, piece
+from smolux.methods.base import Int, Rates, Rows, Words, enlarged
 
 from . import pieces
 from .lists import place_of_particle
 from .method import SizeClass, empty_work, members
-from .state import BITS, CHUNK, FREE, SINGLE, SLOT_BITS
+from .state import BITS, CHUNK, FREE, NEXT, SINGLE, SLOT_BITS, STALE
 from .state import Work as Plain
 from .state import view as plain_view
-from .store import make_changes, make_visit
+from .store import chunks_for, make_changes, make_visit
 from .table import prepare
 
 
@@ -29,8 +30,9 @@ class Work(NamedTuple):
 
     Attributes
     ----------
-    rows : int64 array of shape (R, entries, D)
-        What each particle carries, at its place in the pool, and the others of `smolux.core.rows`.
+    rows : int64 array of shape (R, entries D)
+        What each particle carries, the D numbers of a place of the pool after those of the place
+        before; and the others of `smolux.core.rows`.
     """
 
     meta: np.ndarray
@@ -80,9 +82,10 @@ _remove, _insert, _double = make_changes(True)
 
 @piece
 def _load(w, place):
-    where = place_of_particle(w, place)
-    for d in range(w.mixed.shape[0]):
-        w.mixed[d] += w.rows[where, d]
+    width = w.mixed.shape[0]
+    first = place_of_particle(w, place) * width
+    for d in range(width):
+        w.mixed[d] += w.rows[at(first + d)]
 
 
 @piece
@@ -93,6 +96,23 @@ def _take(s, w, place):
 @piece
 def _put(s, w, size, count, i, j, p):
     _insert(w, size, count)
+
+
+_remove_pair = pieces.make_remove(_remove)
+
+
+@piece
+def _replace(w, held, a, b, gone, size, count):
+    # two that become one: nothing is drawn
+    if gone != 3 or count != 1 or chunks_for(w, size, count, count) > w.meta[FREE]:
+        return NOT_PLAIN, held
+    k, width = at(w.meta[NEXT] - 1), w.mixed.shape[0]  # the candidate that was accepted
+    one, two = w.place_one[k], w.place_two[k]
+    for d in range(width):
+        w.row[d] = w.rows[at(one * width + d)] + w.rows[at(two * width + d)]
+    _remove_pair(w, gone, a, one, b, two)
+    _insert(w, size, count)
+    return (PLAIN if w.meta[STALE] == 0 else LAST), held
 
 
 @dataclass(frozen=True)
@@ -107,7 +127,9 @@ class Carrying(SizeClass):
             _view, pieces.size, pieces.pick, pieces.room, _take, _put, _double, make_visit(tally),
             load=_load,
         )  # fmt: skip
-        return pieces_of(store, pieces.make_draw(pieces.make_find(rate)), prepare)
+        find = pieces.make_find(rate, True)
+        burst = Burst(pieces.row, pieces.hold, find, _replace, pieces.release)
+        return pieces_of(store, pieces.make_draw(find), prepare, burst)
 
     def carrying_work(
         self, rates: Rates, particles: list[Rows], born: Int, state: State, mass: int
@@ -124,25 +146,23 @@ class Carrying(SizeClass):
         plain.before[:] = plain.number
         scratch = np.zeros((len(particles), width), np.int64)
         account = np.zeros((len(particles), 2, width + 1), np.int64)
-        others: Any = (rows, scratch, scratch.copy(), account, born)
+        others: Any = (rows.reshape(len(rows), -1), scratch, scratch.copy(), account, born)
         return Work(*plain, *others)
 
     def grow(self, work: Any, state: State) -> Any:
         grown: Any = super().grow(work, state)
-        if grown.pool.shape[1] == work.rows.shape[1]:
-            return grown
-        rows = np.zeros((*grown.pool.shape, work.rows.shape[2]), np.int64)
-        rows[:, : work.rows.shape[1]] = work.rows
-        return grown._replace(rows=rows)
+        wanted = grown.pool.shape[1] * work.mixed.shape[1]
+        return grown._replace(rows=enlarged(work.rows, max(wanted, work.rows.shape[1])))
 
     def growth(self, work: Any, state: State) -> int:
         return int(super().growth(work, state) + 2 * work.rows.nbytes)
 
     def rows(self, work: Any, state: State, replica: int) -> Rows:
-        filled = np.flatnonzero(work.number[replica])
+        filled, width = np.flatnonzero(work.number[replica]), work.mixed.shape[1]
+        carried = work.rows.reshape(len(work.rows), -1, width)
         sizes = [members(work, replica, int(g), work.pool) for g in filled]
-        rows = [members(work, replica, int(g), work.rows) for g in filled]
-        none = np.zeros((0, work.rows.shape[2]), np.int64)
+        rows = [members(work, replica, int(g), carried) for g in filled]
+        none = np.zeros((0, width), np.int64)
         return np.concatenate([*sizes, np.zeros(0, np.int64)]), np.concatenate([*rows, none])
 
     def split(self, work: Any, state: State, number: int, copies: int, words: Words) -> list[Any]:

@@ -95,20 +95,24 @@ def _nothing_of(w, place, other):
 
 @piece
 def _move_row(w, place, other):
-    for d in range(w.rows.shape[1]):
-        w.rows[place, d] = w.rows[other, d]
+    width = w.mixed.shape[0]
+    for d in range(width):
+        w.rows[at(place * width + d)] = w.rows[at(other * width + d)]
+    prefetch(w.rows, (other - _STRIDE) * width)
 
 
 @piece
 def _write_row(w, place):
-    for d in range(w.rows.shape[1]):
-        w.rows[place, d] = w.row[d]
+    width = w.mixed.shape[0]
+    for d in range(width):
+        w.rows[at(place * width + d)] = w.row[d]
 
 
 @piece
 def _read_row(w, place):
-    for d in range(w.rows.shape[1]):
-        w.row[d] = w.rows[place, d]
+    width = w.mixed.shape[0]
+    for d in range(width):
+        w.row[d] = w.rows[at(place * width + d)]
 
 
 class Lists(NamedTuple):

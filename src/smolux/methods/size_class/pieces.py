@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -58,33 +59,47 @@ def _aim(w, g, slot):
     return there
 
 
-@cold_piece
-def _draw_ahead(w, s, a, b, c, d):
-    """Draw candidates: they depend on the table alone, not on the events in between.
+@piece
+def _aim_at_row(w, g, slot):
+    """Place of a slot, of which the memory is asked for, and that of its row."""
+    there = _aim(w, g, slot)
+    prefetch(w.rows, there * w.mixed.shape[0])
+    return there
 
-    One kind of number after the other: short loops overlap their reads of memory.
-    """
-    pairs = np.uint64(w.meta[PAIRS])
-    for k in range(AHEAD):
-        word, a, b, c, d = rng.step(a, b, c, d)
-        code, column, rest, sure = alias.draw(w.table, pairs, word)
-        w.one[at(k)] = code
-        w.rest[at(k)] = rest
-        w.column[at(k)] = -1 if sure else np.int64(column)
-    for k in range(AHEAD):
-        g, h = w.one[at(k)] >> 16, w.one[at(k)] & 0xFFFF
-        x, a, b, c, d = rng.step(a, b, c, d)
-        y, a, b, c, d = rng.step(a, b, c, d)
-        x = np.int64(upper_half(x, np.uint64(w.room[at(g)])))
-        y = np.int64(upper_half(y, np.uint64(w.room[at(h)])))
-        w.one[at(k)] = (g << SLOT_BITS) | x
-        w.two[at(k)] = (h << SLOT_BITS) | y
-        w.place_one[at(k)] = _aim(w, g, x)
-        w.place_two[at(k)] = _aim(w, h, y)
-    for k in range(AHEAD):
-        w.wait[at(k)], a, b, c, d = rng.exponential_of(s, a, b, c, d)
-    w.meta[NEXT] = 0
-    return a, b, c, d
+
+@lru_cache(maxsize=2)
+def _make_draw_ahead(rows: bool) -> Any:
+    aim = _aim_at_row if rows else _aim
+
+    @cold_piece
+    def draw_ahead(w, s, a, b, c, d):
+        """Draw candidates: they depend on the table alone, not on the events in between.
+
+        One kind of number after the other: short loops overlap their reads of memory.
+        """
+        pairs = np.uint64(w.meta[PAIRS])
+        for k in range(AHEAD):
+            word, a, b, c, d = rng.step(a, b, c, d)
+            code, column, rest, sure = alias.draw(w.table, pairs, word)
+            w.one[at(k)] = code
+            w.rest[at(k)] = rest
+            w.column[at(k)] = -1 if sure else np.int64(column)
+        for k in range(AHEAD):
+            g, h = w.one[at(k)] >> 16, w.one[at(k)] & 0xFFFF
+            x, a, b, c, d = rng.step(a, b, c, d)
+            y, a, b, c, d = rng.step(a, b, c, d)
+            x = np.int64(upper_half(x, np.uint64(w.room[at(g)])))
+            y = np.int64(upper_half(y, np.uint64(w.room[at(h)])))
+            w.one[at(k)] = (g << SLOT_BITS) | x
+            w.two[at(k)] = (h << SLOT_BITS) | y
+            w.place_one[at(k)] = aim(w, g, x)
+            w.place_two[at(k)] = aim(w, h, y)
+        for k in range(AHEAD):
+            w.wait[at(k)], a, b, c, d = rng.exponential_of(s, a, b, c, d)
+        w.meta[NEXT] = 0
+        return a, b, c, d
+
+    return draw_ahead
 
 
 @piece
@@ -94,8 +109,9 @@ def _raise_bound(w, g, h, value):
     w.meta[STALE] = 1
 
 
-def make_find(rate: Any) -> Any:
-    """Bind the search for the next pair, see `smolux.core.burst.Burst`."""
+def make_find(rate: Any, rows: bool = False) -> Any:
+    """Bind the search for the next pair, see `smolux.core.burst.Burst`; with `rows` or without."""
+    draw_ahead = _make_draw_ahead(rows)
 
     @cold_piece
     def look_beside(w, g, size, p):
@@ -138,7 +154,7 @@ def make_find(rate: Any) -> Any:
         waited, last = 0.0, trials + PATIENCE
         while trials < last:
             if w.meta[NEXT] == AHEAD:
-                c0, c1, c2, c3 = _draw_ahead(w, s.rng, c0, c1, c2, c3)
+                c0, c1, c2, c3 = draw_ahead(w, s.rng, c0, c1, c2, c3)
             k = w.meta[NEXT]
             w.meta[NEXT] = k + 1
             waited += w.wait[at(k)]
@@ -172,26 +188,34 @@ def make_draw(find: Any) -> Any:
         s.count[FIRST] = -1
         if s.count[PARTICLES] < 2 or s.clock[MAJORANT] <= 0.0:
             return math.inf
-        return draw_one(s, w, p, factor, limit, _hold(s, w, factor))
+        return draw_one(s, w, p, factor, limit, hold(s, w, factor))
 
     return draw
 
 
-@piece
-def _remove(w, gone, a, place_a, b, place_b):
-    """Take one of a pair out, or both."""
-    g, h = a >> SLOT_BITS, b >> SLOT_BITS
-    if gone != 3:
-        if gone == 1:
-            remove(w, g, place_a)
-        else:
-            remove(w, h, place_b)
-        return
-    # the later slot of a class goes first: then the other stays where it is
-    if g == h and a > b:
-        place_a, place_b = place_b, place_a
-    remove(w, h, place_b)
-    remove(w, g, place_a)
+@lru_cache(maxsize=2)
+def make_remove(remove: Any) -> Any:
+    """Bind taking one of a pair out, or both, to taking out one particle."""
+
+    @piece
+    def remove_of_pair(w, gone, a, place_a, b, place_b):
+        g, h = a >> SLOT_BITS, b >> SLOT_BITS
+        if gone != 3:
+            if gone == 1:
+                remove(w, g, place_a)
+            else:
+                remove(w, h, place_b)
+            return
+        # the later slot of a class goes first: then the other stays where it is
+        if g == h and a > b:
+            place_a, place_b = place_b, place_a
+        remove(w, h, place_b)
+        remove(w, g, place_a)
+
+    return remove_of_pair
+
+
+_remove = make_remove(remove)
 
 
 @piece
@@ -216,12 +240,14 @@ def _put(s, w, size, count, i, j, p):
 
 
 @piece
-def _row(s, w):
+def row(s, w):
+    """See `smolux.core.burst.Burst`."""
     return w.meta[BLOCK] - s.count[SINCE] if s.clock[MAJORANT] > 0.0 else np.int64(0)
 
 
 @piece
-def _hold(s, w, factor):
+def hold(s, w, factor):
+    """See `smolux.core.burst.Burst`."""
     # the unit of waiting times; a division at each event would take as long as drawing one
     return (s.clock[VOLUME] / s.clock[MAJORANT] / factor,)
 
@@ -237,12 +263,12 @@ def _replace(w, held, a, b, gone, size, count):
 
 
 @piece
-def _release(s, held):
-    pass
+def release(s, held):
+    """See `smolux.core.burst.Burst`."""
 
 
 def bind(rate: Any, tally: Any) -> Pieces:
     """Bind the pieces to a rate and a way to count."""
     find = make_find(rate)
     store = Store(view, size, pick, room, _take, _put, double, make_visit(tally))
-    return pieces_of(store, make_draw(find), prepare, Burst(_row, _hold, find, _replace, _release))
+    return pieces_of(store, make_draw(find), prepare, Burst(row, hold, find, _replace, release))
