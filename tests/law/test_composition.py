@@ -197,3 +197,5 @@ def test_mistakes_are_named_all_at_once() -> None:
         sx.Model(sx.kernels.Constant(), attributes=[given])
     with pytest.raises(InputError, match="attribute 'soot'"):
         sx.Model(sx.kernels.Constant(), attributes="soot")
+    with pytest.raises(InputError, match="ensembles do not observe"):
+        sx.ensemble(model, [1.0], ["M2"], replicas=100)

@@ -172,6 +172,11 @@ def make_sampler(
     number = whole(replicas)
     if number is None or number < 2:
         problems.append(f"replicas = {replicas!r}: must be a whole number of at least 2")
+    if getattr(model, "attributes", ()):
+        problems.append(
+            "model: its particles carry a composition, which ensembles do not observe: leave the "
+            "attributes out, or use smolux.simulate"
+        )
     settings = Settings.for_model(
         model,
         {

@@ -172,12 +172,11 @@ def _take(
         "codes": arrays[f"{key}/codes"],
         "windows": TimeWindows(**part("windows")),
         "distribution": distribution,
-        "joint": joint,
         "seconds": about["seconds"],
         "bounds_seconds": about.get("bounds_seconds", 0.0),
     }
     if "parts" not in about:
-        return Group(plan, work=plan.store.work_type(**part("work")), **common)
+        return Group(plan, work=plan.store.work_type(**part("work")), joint=joint, **common)
     times = tuple(about.get("open", ()))
     alone = within(plan, times) if times else replace(plan, subvolumes=1, replicas=1)
     parts: list[Any] = [

@@ -45,8 +45,10 @@ class Computed:
     collisions: float
 
 
-def choose(methods: Sequence[str] | None) -> list[str]:
-    """Return the methods to compare: those given, or all and the solver.
+def choose(methods: Sequence[str] | None, carried: bool = False) -> list[str]:
+    """Return the methods to compare: those given, or all that can and the solver.
+
+    Not all can if something is `carried` by the particles.
 
     Raises
     ------
@@ -57,6 +59,9 @@ def choose(methods: Sequence[str] | None) -> list[str]:
     wrong = [m for m in methods or () if m not in known]
     if wrong:
         raise InputError([f"--method {m}: unknown{did_you_mean(m, known)}" for m in wrong])
+    if carried and not methods:
+        methods = [m.name for m in smolux.methods.METHODS if m().carrying() is not None]
+        return [*methods, SOLVER]
     return list(dict.fromkeys(methods or known))
 
 
@@ -193,7 +198,7 @@ def compared(case: Case, methods: Sequence[str] | None, figure: Path | None) -> 
         raise InputError("compare: the case has no table [run], so there is nothing to simulate")
     seeded = case.with_seed()
     assert seeded.run is not None
-    chosen = choose(methods)
+    chosen = choose(methods, bool(case.model.attributes))
     if figure is not None:
         from smolux.plotting.style import kind_of
 
