@@ -20,14 +20,17 @@ class MadeOfKernels(Kernel):
 
     @property
     def rigorous(self) -> bool:  # type: ignore[override]
+        """See `Kernel.rigorous`."""
         return all(kernel.rigorous for kernel in self.made_of)
 
     @property
     def searched(self) -> bool:  # type: ignore[override]
+        """See `Kernel.searched`."""
         return any(kernel.searched for kernel in self.made_of)
 
     @property
     def arbitrary(self) -> bool:  # type: ignore[override]
+        """See `Kernel.arbitrary`."""
         return any(kernel.arbitrary for kernel in self.made_of)
 
     @property

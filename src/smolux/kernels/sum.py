@@ -123,6 +123,7 @@ class Sum(MadeOfKernels):
 
     @property
     def cheap(self) -> bool:  # type: ignore[override]
+        """See `Kernel.cheap`."""
         return all(kernel.cheap for kernel in self.terms)
 
     @property

@@ -56,6 +56,7 @@ class OwnKernel(Kernel):
 
     @property
     def searched(self) -> bool:  # type: ignore[override]
+        """See `Kernel.searched`."""
         return self.law.stated is None
 
     def interval(self, i: Interval, j: Interval) -> Interval:

@@ -66,6 +66,7 @@ class Varying(MadeOfKernels):
 
     @property
     def cheap(self) -> bool:  # type: ignore[override]
+        """See `Kernel.cheap`."""
         return self.kernel.cheap
 
     @property
