@@ -161,7 +161,8 @@ class Kernel:
             # what is known of bounds that are found from the rate depends on the rate
             for name in ("rigorous", "searched", "singled_out"):
                 if name not in vars(cls):
-                    setattr(cls, name, property(partial(_of_rate, name)))
+                    told = f"See `Kernel.{name}`."
+                    setattr(cls, name, property(partial(_of_rate, name), doc=told))
 
     def interval(self, i: Interval, j: Interval) -> Interval:
         """Bounds of the law over intervals of sizes, the best only where these are small.
