@@ -66,7 +66,7 @@ def test_a_particle_is_a_hypergeometric_draw_of_all_monomers(method: str, what: 
 @pytest.mark.parametrize("method", METHODS)
 def test_the_scatter_among_particles_follows_from_their_number(method: str) -> None:
     """Of N monomers in n particles, on average ``(n - 1) / (N - 1)`` of that of pure ones."""
-    model = sx.Model(sx.kernels.Additive(), BREAKING["shattering"], attributes=[THREE])
+    model = sx.Model(sx.kernels.Constant(), BREAKING["shattering"], attributes=[THREE])
     ds = simulate(model, [0.3, 1.0, 2.0], method, particles=400, replicas=600)
     difference = ds["mixing"] - (ds["particles"] - 1) / 399
     sigma = difference.std("replica", ddof=1) / np.sqrt(600)
@@ -77,7 +77,7 @@ def test_the_scatter_among_particles_follows_from_their_number(method: str) -> N
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("what", BREAKING)
 def test_each_kind_is_conserved(method: str, what: str) -> None:
-    model = sx.Model(sx.kernels.Ballistic(), BREAKING[what], attributes=[THREE])
+    model = sx.Model(sx.kernels.Constant(2.0), BREAKING[what], attributes=[THREE])
     ds = simulate(model, [0.0, 1.0, 5.0], method, particles=500, population="doubling")
     times = ds["volume"] / ds["volume"].isel(time=0)
     assert (ds["monomers"] == ds["monomers"].isel(time=0) * times).all()
